@@ -1,0 +1,518 @@
+//! The scene in memory: what every loader produces and every renderer uploads.
+//!
+//! Spaces: object space (`_os`) of one mesh, world space (`_ws`, metres, right-handed, +Y up as in
+//! glTF). Colours are linear Rec. 709 unless a name says sRGB. Triangles are counter-clockwise
+//! seen from their front.
+
+use std::{path::PathBuf, sync::Arc};
+
+use glam::{Affine3A, Mat4, Vec2, Vec3};
+
+/// Attributes of one vertex besides its position, packed as the GPU reads them (28 bytes).
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct VertexAttributes {
+    /// Unit normal in object space, octahedral, two 16-bit signed normalised numbers, x in the low half.
+    pub normal_os_oct: u32,
+    /// Unit tangent in object space, octahedral as the normal; bit 16 (the lowest bit of y) holds
+    /// the handedness instead: 1 for a bitangent of `-cross(normal, tangent)`.
+    pub tangent_os_oct: u32,
+    /// Texture coordinates, set 0, as the bits of two `f32`.
+    pub uv0: [u32; 2],
+    /// Texture coordinates, set 1, as the bits of two `f32`.
+    pub uv1: [u32; 2],
+    /// Vertex colour, linear, RGBA, 8 bits each, R in the lowest byte; white where none is given.
+    pub color_rgba8: u32,
+}
+
+/// One triangle list with one material (a glTF primitive).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mesh {
+    /// Name for messages.
+    pub name: String,
+    /// First index in [`Scene::indices`].
+    pub first_index: u32,
+    /// Number of indices, a multiple of three.
+    pub index_count: u32,
+    /// First vertex in [`Scene::positions_os`]; indices count from here.
+    pub first_vertex: u32,
+    /// Number of vertices.
+    pub vertex_count: u32,
+    /// Index into [`Scene::materials`].
+    pub material: u32,
+    /// Bounds in object space over all vertices of the mesh.
+    pub bounds_os: Aabb,
+}
+
+/// One mesh placed in the world: one draw.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Instance {
+    /// Index into [`Scene::meshes`].
+    pub mesh: u32,
+    /// Index into [`Scene::nodes`] of the node that places it.
+    pub node: u32,
+    /// Object to world. A negative determinant mirrors: its triangles are clockwise in world space.
+    pub world_from_object: Affine3A,
+}
+
+/// An axis-aligned box; empty when `min > max`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Aabb {
+    /// Least corner.
+    pub min: Vec3,
+    /// Greatest corner.
+    pub max: Vec3,
+}
+
+/// How a texture is wrapped outside [0, 1].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Wrap {
+    /// Repeats.
+    #[default]
+    Repeat,
+    /// Repeats, every second copy mirrored.
+    Mirror,
+    /// Stays at the edge.
+    Clamp,
+}
+
+/// A sampler; glTF's defaults are linear, linear mip-maps and repetition.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Sampler {
+    /// Nearest instead of linear magnification.
+    pub mag_nearest: bool,
+    /// Nearest instead of linear minification within a level.
+    pub min_nearest: bool,
+    /// Use of mip-map levels.
+    pub mip: MipMode,
+    /// Wrapping in u.
+    pub wrap_u: Wrap,
+    /// Wrapping in v.
+    pub wrap_v: Wrap,
+}
+
+/// Use of mip-map levels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum MipMode {
+    /// The finest level alone.
+    None,
+    /// The nearest level.
+    Nearest,
+    /// Linear between levels.
+    #[default]
+    Linear,
+}
+
+/// A texture as a material uses it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TextureRef {
+    /// Index into [`Scene::images`].
+    pub image: u32,
+    /// How it is sampled.
+    pub sampler: Sampler,
+    /// Texture coordinate set, 0 or 1.
+    pub uv_set: u32,
+    /// KHR_texture_transform as the rows of a 2×3 matrix: `uv' = (dot(row0, (u, v, 1)), dot(row1, (u, v, 1)))`.
+    pub uv_transform: [[f32; 3]; 2],
+}
+
+/// How alpha is used.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum AlphaMode {
+    /// Ignored.
+    #[default]
+    Opaque,
+    /// A surface exists where alpha ≥ cutoff.
+    Mask {
+        /// The cutoff.
+        cutoff: f32,
+    },
+    /// Blended over what lies behind.
+    Blend,
+}
+
+/// A metal-rough material of glTF 2.0.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Material {
+    /// Name for messages.
+    pub name: String,
+    /// Linear base colour and alpha.
+    pub base_color_factor: [f32; 4],
+    /// sRGB base colour, alpha linear.
+    pub base_color_texture: Option<TextureRef>,
+    /// Metalness, 0 to 1.
+    pub metallic_factor: f32,
+    /// Perceptual roughness, 0 to 1.
+    pub roughness_factor: f32,
+    /// Roughness in G, metalness in B.
+    pub metallic_roughness_texture: Option<TextureRef>,
+    /// Tangent-space normal map.
+    pub normal_texture: Option<TextureRef>,
+    /// Scale of the normal map's x and y.
+    pub normal_scale: f32,
+    /// Occlusion in R.
+    pub occlusion_texture: Option<TextureRef>,
+    /// Strength of occlusion, 0 to 1.
+    pub occlusion_strength: f32,
+    /// Linear emission, the strength of KHR_materials_emissive_strength multiplied in.
+    pub emissive_factor: [f32; 3],
+    /// sRGB emission.
+    pub emissive_texture: Option<TextureRef>,
+    /// Use of alpha.
+    pub alpha_mode: AlphaMode,
+    /// Whether back faces are drawn, their normals turned.
+    pub double_sided: bool,
+    /// KHR_materials_unlit: base colour is the radiance that leaves.
+    pub unlit: bool,
+}
+
+/// Where the encoded bytes of an image are.
+#[derive(Clone, Debug)]
+pub enum ImageData {
+    /// A PNG or JPEG file.
+    File(PathBuf),
+    /// Encoded PNG or JPEG bytes.
+    Encoded(Arc<[u8]>),
+    /// Pixels made by code: RGBA, 8 bits each, row by row from the top.
+    Rgba8 {
+        /// Width in pixels.
+        width: u32,
+        /// Height in pixels.
+        height: u32,
+        /// `width * height * 4` bytes.
+        pixels: Arc<[u8]>,
+    },
+}
+
+/// An image: decoded when it is uploaded, so that only few are in memory at a time. Its header
+/// was read on loading.
+#[derive(Clone, Debug)]
+pub struct Image {
+    /// Name for messages: the URI, or the glTF index.
+    pub name: String,
+    /// Where the bytes are.
+    pub data: ImageData,
+    /// Width in pixels, from the header.
+    pub width: u32,
+    /// Height in pixels, from the header.
+    pub height: u32,
+}
+
+/// Kind of a light, as in KHR_lights_punctual.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LightKind {
+    /// In all directions; intensity in candela.
+    Point,
+    /// Within a cone about the direction; intensity in candela.
+    Spot {
+        /// Angle from the axis where falloff begins, radians.
+        inner_angle_rad: f32,
+        /// Angle from the axis where light ends, radians.
+        outer_angle_rad: f32,
+    },
+    /// From infinity; intensity in lux.
+    Directional,
+}
+
+/// A light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Light {
+    /// Kind.
+    pub kind: LightKind,
+    /// Position in world space, metres (not used by directional lights).
+    pub position_ws: Vec3,
+    /// Unit direction in which the light shines, world space.
+    pub direction_ws: Vec3,
+    /// Linear colour times intensity: candela, or lux for directional lights.
+    pub intensity: Vec3,
+    /// Distance at which it ends, metres; infinite where none is given.
+    pub range_m: f32,
+}
+
+/// Projection of a camera. Depth is reversed: 1 at the near plane, 0 at infinity (perspective) or
+/// at the far plane (orthographic).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Projection {
+    /// Perspective, far plane at infinity.
+    Perspective {
+        /// Vertical angle of view, radians.
+        fov_y_rad: f32,
+        /// Distance of the near plane, metres.
+        near_m: f32,
+    },
+    /// Orthographic.
+    Orthographic {
+        /// Half the height of the view, metres; half the width follows from the image.
+        half_height_m: f32,
+        /// Near plane, metres.
+        near_m: f32,
+        /// Far plane, metres.
+        far_m: f32,
+    },
+}
+
+/// A camera: looks along its −Z, +Y up.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Camera {
+    /// Name, as `--camera` takes it.
+    pub name: String,
+    /// Camera to world, rigid.
+    pub world_from_view: Affine3A,
+    /// Projection.
+    pub projection: Projection,
+}
+
+/// What surrounds the scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Environment {
+    /// Radiance that reaches a surface from every direction: a white surface reflects as much.
+    pub ambient_radiance: Vec3,
+    /// Radiance of a pixel that shows no surface.
+    pub background_radiance: Vec3,
+}
+
+/// A node of the hierarchy.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Node {
+    /// Name for messages and patterns.
+    pub name: String,
+    /// Index of the parent; parents precede children.
+    pub parent: Option<u32>,
+    /// Parent from node, at rest.
+    pub local: Affine3A,
+}
+
+/// A scene.
+#[derive(Clone, Debug, Default)]
+pub struct Scene {
+    /// Name for reports.
+    pub name: String,
+    /// Vertex positions in object space, all meshes one after another.
+    pub positions_os: Vec<[f32; 3]>,
+    /// The other attributes, as many as positions.
+    pub attributes: Vec<VertexAttributes>,
+    /// Indices of all meshes, each counted from its mesh's first vertex.
+    pub indices: Vec<u32>,
+    /// Meshes.
+    pub meshes: Vec<Mesh>,
+    /// Nodes, parents first.
+    pub nodes: Vec<Node>,
+    /// Draws, in file order.
+    pub instances: Vec<Instance>,
+    /// Materials; at least one where there is a mesh.
+    pub materials: Vec<Material>,
+    /// Images.
+    pub images: Vec<Image>,
+    /// Lights of the file.
+    pub lights: Vec<Light>,
+    /// Cameras: those of the file, else one made to fit.
+    pub cameras: Vec<Camera>,
+    /// What surrounds it.
+    pub environment: Environment,
+    /// Animations of nodes.
+    pub animations: Vec<crate::animation::Animation>,
+    /// What was tolerated, a line each.
+    pub warnings: Vec<String>,
+}
+
+impl Default for Sampler {
+    fn default() -> Self {
+        Self { mag_nearest: false, min_nearest: false, mip: MipMode::Linear, wrap_u: Wrap::Repeat, wrap_v: Wrap::Repeat }
+    }
+}
+
+impl Default for Environment {
+    fn default() -> Self {
+        Self { ambient_radiance: Vec3::splat(0.05), background_radiance: Vec3::ZERO }
+    }
+}
+
+impl Default for Material {
+    fn default() -> Self {
+        Self {
+            name: String::new(),
+            base_color_factor: [1.0; 4],
+            base_color_texture: None,
+            metallic_factor: 1.0,
+            roughness_factor: 1.0,
+            metallic_roughness_texture: None,
+            normal_texture: None,
+            normal_scale: 1.0,
+            occlusion_texture: None,
+            occlusion_strength: 1.0,
+            emissive_factor: [0.0; 3],
+            emissive_texture: None,
+            alpha_mode: AlphaMode::Opaque,
+            double_sided: false,
+            unlit: false,
+        }
+    }
+}
+
+impl Aabb {
+    /// The empty box.
+    pub const EMPTY: Self = Self { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY };
+
+    /// Whether nothing is inside.
+    pub fn is_empty(&self) -> bool {
+        self.min.cmpgt(self.max).any()
+    }
+
+    /// Grows to hold a point.
+    pub fn extend(&mut self, point: Vec3) {
+        self.min = self.min.min(point);
+        self.max = self.max.max(point);
+    }
+
+    /// The least box that holds both.
+    pub fn union(&self, other: &Self) -> Self {
+        Self { min: self.min.min(other.min), max: self.max.max(other.max) }
+    }
+
+    /// The box of the eight corners, transformed; empty stays empty.
+    pub fn transformed(&self, m: &Affine3A) -> Self {
+        let mut out = Self::EMPTY;
+        if !self.is_empty() {
+            for i in 0..8u32 {
+                let pick = |bit: u32, lo: f32, hi: f32| if i >> bit & 1 == 0 { lo } else { hi };
+                out.extend(m.transform_point3(Vec3::new(
+                    pick(0, self.min.x, self.max.x),
+                    pick(1, self.min.y, self.max.y),
+                    pick(2, self.min.z, self.max.z),
+                )));
+            }
+        }
+        out
+    }
+
+    /// Extent along each axis; zero where empty.
+    pub fn size(&self) -> Vec3 {
+        if self.is_empty() { Vec3::ZERO } else { self.max - self.min }
+    }
+
+    /// Centre; the origin where empty.
+    pub fn center(&self) -> Vec3 {
+        if self.is_empty() { Vec3::ZERO } else { (self.min + self.max) * 0.5 }
+    }
+}
+
+impl Camera {
+    /// World to view.
+    pub fn view_from_world(&self) -> Mat4 {
+        Mat4::from(self.world_from_view.inverse())
+    }
+
+    /// View to clip, for an image of `aspect` = width / height. Reversed depth, y down as in Vulkan.
+    pub fn clip_from_view(&self, aspect: f32) -> Mat4 {
+        use glam::Vec4;
+        match self.projection {
+            Projection::Perspective { fov_y_rad, near_m } => {
+                let f = 1.0 / (0.5 * fov_y_rad).tan();
+                Mat4::from_cols(
+                    Vec4::new(f / aspect, 0.0, 0.0, 0.0),
+                    Vec4::new(0.0, -f, 0.0, 0.0),
+                    Vec4::new(0.0, 0.0, 0.0, -1.0),
+                    Vec4::new(0.0, 0.0, near_m, 0.0),
+                )
+            }
+            Projection::Orthographic { half_height_m, near_m, far_m } => {
+                // depth = (z_view + far) / (far - near), with z_view from -near (1) to -far (0)
+                let depth = far_m - near_m;
+                Mat4::from_cols(
+                    Vec4::new(1.0 / (half_height_m * aspect), 0.0, 0.0, 0.0),
+                    Vec4::new(0.0, -1.0 / half_height_m, 0.0, 0.0),
+                    Vec4::new(0.0, 0.0, 1.0 / depth, 0.0),
+                    Vec4::new(0.0, 0.0, far_m / depth, 1.0),
+                )
+            }
+        }
+    }
+
+    /// Position of the eye in world space.
+    pub fn eye_ws(&self) -> Vec3 {
+        self.world_from_view.translation.into()
+    }
+
+    /// A perspective camera at `eye_ws` that looks at `target_ws`, +Y up (or +Z where it looks along Y).
+    pub fn look_at(name: &str, eye_ws: Vec3, target_ws: Vec3, fov_y_rad: f32, near_m: f32) -> Self {
+        let forward = (target_ws - eye_ws).try_normalize().unwrap_or(Vec3::NEG_Z);
+        let up = if forward.y.abs() > 0.9999 { Vec3::Z } else { Vec3::Y };
+        let right = forward.cross(up).normalize();
+        let up = right.cross(forward);
+        Self {
+            name: name.to_owned(),
+            world_from_view: Affine3A::from_cols(right.into(), up.into(), (-forward).into(), eye_ws.into()),
+            projection: Projection::Perspective { fov_y_rad, near_m },
+        }
+    }
+}
+
+impl Scene {
+    /// Bounds in world space: each instance's own box, transformed by its eight corners.
+    pub fn bounds_ws(&self) -> Aabb {
+        self.instances.iter().fold(Aabb::EMPTY, |b, i| {
+            b.union(&self.meshes[i.mesh as usize].bounds_os.transformed(&i.world_from_object))
+        })
+    }
+
+    /// Triangles drawn: those of each instance's mesh.
+    pub fn triangle_count(&self) -> u64 {
+        self.instances.iter().map(|i| u64::from(self.meshes[i.mesh as usize].index_count / 3)).sum()
+    }
+}
+
+impl VertexAttributes {
+    /// Packs attributes. `normal_os` and `tangent_os` need not be unit; `handedness` is the sign
+    /// of the bitangent (glTF's TANGENT.w). Angular error below 1e-4 rad (tangent), 5e-5 (normal).
+    pub fn pack(normal_os: Vec3, tangent_os: Vec3, handedness: f32, uv0: Vec2, uv1: Vec2, color: [f32; 4]) -> Self {
+        let sign_bit = u32::from(handedness < 0.0) << 16;
+        Self {
+            normal_os_oct: oct_encode(normal_os),
+            tangent_os_oct: (oct_encode(tangent_os) & !(1 << 16)) | sign_bit,
+            uv0: [uv0.x.to_bits(), uv0.y.to_bits()],
+            uv1: [uv1.x.to_bits(), uv1.y.to_bits()],
+            color_rgba8: color
+                .iter()
+                .enumerate()
+                .fold(0, |c, (i, v)| c | ((v.clamp(0.0, 1.0) * 255.0 + 0.5) as u32) << (8 * i)),
+        }
+    }
+
+    /// The unit normal in object space.
+    pub fn normal_os(&self) -> Vec3 {
+        oct_decode(self.normal_os_oct)
+    }
+
+    /// The unit tangent in object space and the bitangent's sign.
+    pub fn tangent_os(&self) -> (Vec3, f32) {
+        let sign = if self.tangent_os_oct >> 16 & 1 == 1 { -1.0 } else { 1.0 };
+        (oct_decode(self.tangent_os_oct & !(1 << 16)), sign)
+    }
+
+    /// Texture coordinates of set 0 or 1.
+    pub fn uv(&self, set: u32) -> Vec2 {
+        let [u, v] = if set == 1 { self.uv1 } else { self.uv0 };
+        Vec2::new(f32::from_bits(u), f32::from_bits(v))
+    }
+}
+
+/// Encodes a direction on the octahedron (Cigolle et al. 2014), 2 × 16 bits signed normalised.
+fn oct_encode(v: Vec3) -> u32 {
+    let l1 = v.x.abs() + v.y.abs() + v.z.abs();
+    let n = if l1 > 0.0 && l1.is_finite() { v / l1 } else { Vec3::Z };
+    let (mut x, mut y) = (n.x, n.y);
+    if n.z < 0.0 {
+        (x, y) = ((1.0 - n.y.abs()).copysign(n.x), (1.0 - n.x.abs()).copysign(n.y));
+    }
+    let q = |f: f32| u32::from(((f.clamp(-1.0, 1.0) * 32767.0).round() as i16) as u16);
+    q(x) | q(y) << 16
+}
+
+/// Decodes what [`oct_encode`] made.
+fn oct_decode(bits: u32) -> Vec3 {
+    let d = |h: u32| (f32::from(h as u16 as i16) / 32767.0).max(-1.0);
+    let (x, y) = (d(bits & 0xffff), d(bits >> 16));
+    let z = 1.0 - x.abs() - y.abs();
+    let t = (-z).max(0.0);
+    Vec3::new(x - t.copysign(x), y - t.copysign(y), z).normalize()
+}
