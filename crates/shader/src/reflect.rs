@@ -1,0 +1,1 @@
+//! Reads from SPIR-V what a shader declares.

@@ -1,0 +1,1 @@
+//! Structs that every technique's shaders share.
