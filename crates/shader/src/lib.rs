@@ -290,6 +290,15 @@ impl Reflection {
     }
 }
 
+/// Decodes little-endian SPIR-V words; bytes past the last whole word are left out.
+pub fn words_of(bytes: &[u8]) -> Shared<u32> {
+    bytes
+        .chunks_exact(4)
+        .map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]]))
+        .collect::<Vec<_>>()
+        .into()
+}
+
 /// One compiled variant of a shader file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shader {

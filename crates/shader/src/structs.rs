@@ -1,1 +1,121 @@
-//! Structs that every technique's shaders share.
+//! Structs that every technique's shaders share; their GLSL twins stand in `include/`.
+
+use crate::shader_struct;
+
+shader_struct! {
+    /// What every pass of a frame knows (`include/frame.glsl`).
+    pub struct FrameConstants {
+        /// World to clip, columns.
+        pub clip_from_world: [[f32; 4]; 4],
+        /// Clip to world, columns.
+        pub world_from_clip: [[f32; 4]; 4],
+        /// View distance in metres of a depth d: (d x + y) / (d z + w).
+        pub depth_to_distance: [f32; 4],
+        /// View distance in metres of a world point p: dot(xyz, p) + w.
+        pub distance_from_world: [f32; 4],
+        /// Eye in world space and 1, or the direction to the eye and 0 under an orthographic camera.
+        pub eye_ws: [f32; 4],
+        /// Image size.
+        pub size_px: [u32; 2],
+        /// Tiles of 16×16 pixels in each direction.
+        pub tile_count: [u32; 2],
+        /// Radiance that reaches a surface from every direction.
+        pub ambient_radiance: [f32; 3],
+        /// Lights in the list.
+        pub light_count: u32,
+        /// Radiance of a pixel without a surface.
+        pub background_radiance: [f32; 3],
+        /// Lights without an end (directional, or no range): the first of the list.
+        pub unbounded_light_count: u32,
+    }
+
+    /// One draw: at most 1,024 triangles of one instance (`include/scene.glsl`).
+    pub struct DrawData {
+        /// First row of the matrix object → world.
+        pub object_row0: [f32; 4],
+        /// Second row.
+        pub object_row1: [f32; 4],
+        /// Third row.
+        pub object_row2: [f32; 4],
+        /// First index in the scene's index buffer.
+        pub first_index: u32,
+        /// First vertex of its mesh.
+        pub first_vertex: u32,
+        /// Material.
+        pub material: u32,
+        /// `DRAW_MIRRORED` or 0.
+        pub flags: u32,
+    }
+
+    /// A material (`include/scene.glsl`); slots as `TextureSlot` packs them.
+    pub struct MaterialData {
+        /// Linear colour and alpha.
+        pub base_color_factor: [f32; 4],
+        /// Linear radiance.
+        pub emissive_factor: [f32; 3],
+        /// Alpha below it is no surface (masked materials).
+        pub alpha_cutoff: f32,
+        /// 0 to 1.
+        pub metallic_factor: f32,
+        /// Perceptual, 0 to 1.
+        pub roughness_factor: f32,
+        /// Scale of the normal map's x and y.
+        pub normal_scale: f32,
+        /// 0 to 1.
+        pub occlusion_strength: f32,
+        /// `MATERIAL_*` bits.
+        pub flags: u32,
+        /// First of five texture transforms.
+        pub uv_transform: u32,
+        /// Base colour texture.
+        pub base_color_slot: u32,
+        /// Metal-rough texture.
+        pub metallic_roughness_slot: u32,
+        /// Normal map.
+        pub normal_slot: u32,
+        /// Occlusion texture.
+        pub occlusion_slot: u32,
+        /// Emission texture.
+        pub emissive_slot: u32,
+        /// Unused.
+        pub _padding: u32,
+    }
+
+    /// A light (`include/shading.glsl`).
+    pub struct LightData {
+        /// World space, metres.
+        pub position_ws: [f32; 3],
+        /// Metres; infinite where it has no end.
+        pub range_m: f32,
+        /// Candela, or lux where directional; linear colour.
+        pub intensity: [f32; 3],
+        /// 0 point, 1 spot, 2 directional.
+        pub kind: u32,
+        /// Unit direction in which it shines.
+        pub direction_ws: [f32; 3],
+        /// 1 / range², 0 where it has no end.
+        pub inverse_range_sq: f32,
+        /// Scale of the cone's falloff.
+        pub spot_scale: f32,
+        /// Offset of the cone's falloff.
+        pub spot_offset: f32,
+        /// Unused.
+        pub _padding: [u32; 2],
+    }
+}
+
+/// Layouts that builds check by default.
+pub const LAYOUTS: &[crate::StructLayout] =
+    &[FrameConstants::LAYOUT, DrawData::LAYOUT, MaterialData::LAYOUT, LightData::LAYOUT];
+
+/// `DrawData::flags`: negative determinant.
+pub const DRAW_MIRRORED: u32 = 1;
+/// `MaterialData::flags`: base colour is what leaves.
+pub const MATERIAL_UNLIT: u32 = 1;
+/// `MaterialData::flags`: back faces are drawn.
+pub const MATERIAL_DOUBLE_SIDED: u32 = 2;
+/// Texture slot of a texture that is not there.
+pub const NO_TEXTURE: u32 = u32::MAX;
+/// Bits of a triangle's number within its draw, in a 32-bit triangle ID; the draw's number takes the others.
+/// `TRIANGLE_BITS` in `include/scene.glsl`.
+pub const TRIANGLE_BITS: u32 = 10;

@@ -1,0 +1,54 @@
+// What every pass of a frame knows: camera, image, counts.
+//
+// Twin: struct FrameConstants in crates/shader/src/structs.rs, checked at build.
+// Spaces: world (metres), clip (Vulkan: y down, depth reversed, 1 near and 0 far). A "view distance" is measured
+// along the view direction from the eye, in metres, positive in front of it.
+#ifndef AFTERLIGHT_FRAME
+#define AFTERLIGHT_FRAME
+#extension GL_EXT_scalar_block_layout : require
+#extension GL_EXT_samplerless_texture_functions : require
+#extension GL_EXT_control_flow_attributes : enable
+
+struct FrameConstants {
+    mat4 clip_from_world;
+    mat4 world_from_clip;
+    vec4 depth_to_distance;     // view distance = (d x + y) / (d z + w) for a depth d
+    vec4 distance_from_world;   // view distance of p = dot(xyz, p) + w
+    vec4 eye_ws;                // (eye, 1), or (direction to the eye, 0) where the camera is orthographic
+    uvec2 size_px;
+    uvec2 tile_count;
+    vec3 ambient_radiance;
+    uint light_count;
+    vec3 background_radiance;
+    uint unbounded_light_count; // lights without an end, first in the list
+};
+
+layout(set = 0, binding = 0, scalar) uniform FrameBlock {
+    FrameConstants frame;
+};
+
+const float PI = 3.14159265358979;
+
+// Centre of a pixel in normalised device coordinates.
+vec2 ndc_from_pixel(uvec2 pixel) {
+    return (vec2(pixel) + 0.5) * 2.0 / vec2(frame.size_px) - 1.0;
+}
+
+// World position of a point of the depth buffer.
+vec3 position_from_depth(vec2 ndc, float depth) {
+    vec4 p = frame.world_from_clip * vec4(ndc, depth, 1.0);
+    return p.xyz / p.w;
+}
+
+// View distance in metres of a depth; infinite at depth 0 under perspective.
+float distance_from_depth(float depth) {
+    vec4 k = frame.depth_to_distance;
+    return (depth * k.x + k.y) / (depth * k.z + k.w);
+}
+
+// Unit vector from a point to the eye.
+vec3 view_direction(vec3 position_ws) {
+    return normalize(frame.eye_ws.xyz - position_ws * frame.eye_ws.w);
+}
+
+#endif

@@ -1,0 +1,64 @@
+// The scene's records: draws and materials.
+//
+// Twins: DrawData and MaterialData in crates/shader/src/structs.rs, checked at build.
+#ifndef AFTERLIGHT_SCENE
+#define AFTERLIGHT_SCENE
+#include "packing.glsl"
+
+// A draw is at most 1,024 triangles of one instance, so that a triangle's number within its draw takes ten bits.
+struct DrawData {
+    vec4 object_row0;   // rows of the 3x4 matrix object -> world
+    vec4 object_row1;
+    vec4 object_row2;
+    uint first_index;
+    uint first_vertex;
+    uint material;
+    uint flags;         // DRAW_MIRRORED
+};
+const uint DRAW_MIRRORED = 1u;  // negative determinant: front faces are clockwise in world space
+const uint TRIANGLE_BITS = 10u;
+const uint NO_TRIANGLE = 0xffffffffu;
+
+// A texture slot: bits 0-7 bucket (an array of textures of one size, format and sampler), 8-23 layer, 24 the set of
+// texture coordinates, 25 a transform; all ones where there is no texture.
+const uint NO_TEXTURE = 0xffffffffu;
+
+struct MaterialData {
+    vec4 base_color_factor;
+    vec3 emissive_factor;
+    float alpha_cutoff;
+    float metallic_factor;
+    float roughness_factor;
+    float normal_scale;
+    float occlusion_strength;
+    uint flags;             // MATERIAL_*
+    uint uv_transform;      // first of five transforms, in the order of the slots below
+    uint base_color_slot;
+    uint metallic_roughness_slot;
+    uint normal_slot;
+    uint occlusion_slot;
+    uint emissive_slot;
+    uint _padding;
+};
+const uint MATERIAL_UNLIT = 1u;
+const uint MATERIAL_DOUBLE_SIDED = 2u;
+
+// Normal matrix times n: the cofactor matrix, turned where the draw is mirrored, so that an outward normal stays one.
+vec3 normal_to_world(vec4 r0, vec4 r1, vec4 r2, bool mirrored, vec3 n) {
+    vec3 world = vec3(dot(cross(r1.xyz, r2.xyz), n), dot(cross(r2.xyz, r0.xyz), n), dot(cross(r0.xyz, r1.xyz), n));
+    return normalize(mirrored ? -world : world);
+}
+
+// Tangent in world space and the bitangent's sign there; mirroring turns the sign.
+vec4 tangent_to_world(vec4 r0, vec4 r1, vec4 r2, bool mirrored, vec4 t) {
+    vec3 world = vec3(dot(r0.xyz, t.xyz), dot(r1.xyz, t.xyz), dot(r2.xyz, t.xyz));
+    return vec4(normalize(world), mirrored ? -t.w : t.w);
+}
+
+// An affine transform given by its rows.
+vec3 position_to_world(vec4 r0, vec4 r1, vec4 r2, vec3 p) {
+    vec4 h = vec4(p, 1.0);
+    return vec3(dot(r0, h), dot(r1, h), dot(r2, h));
+}
+
+#endif

@@ -1,0 +1,115 @@
+// The illumination model, once for every technique: glTF 2.0's metal-rough BRDF (appendix B of its specification) under
+// point, spot and directional lights (KHR_lights_punctual), a constant ambient term, emission.
+//
+// CPU twin: crates/oracle/src/brdf.rs.
+#ifndef AFTERLIGHT_SHADING
+#define AFTERLIGHT_SHADING
+#include "frame.glsl"
+#include "material.glsl"
+
+struct LightData {
+    vec3 position_ws;
+    float range_m;              // infinity where it has no end
+    vec3 intensity;             // candela, or lux where directional
+    uint kind;                  // LIGHT_*
+    vec3 direction_ws;          // unit, in which it shines
+    float inverse_range_sq;     // 1/m^2, 0 where it has no end
+    float spot_scale;           // angular falloff: clamp(cos * scale + offset)^2
+    float spot_offset;
+    uvec2 _padding;
+};
+const uint LIGHT_POINT = 0u;
+const uint LIGHT_SPOT = 1u;
+const uint LIGHT_DIRECTIONAL = 2u;
+
+layout(set = 0, binding = 4, scalar) readonly buffer Lights {
+    LightData lights[];
+};
+
+// 1 where every light is a point light, so that the code for the others goes.
+layout(constant_id = 6) const uint ONLY_POINT_LIGHTS = 0u;
+
+// Perceptual roughness below this makes highlights that neither pixels nor 32-bit floats resolve.
+const float MIN_ROUGHNESS = 0.045;
+
+// A surface with what its BRDF reuses for every light.
+struct ShadingPoint {
+    vec3 position_ws;
+    vec3 normal_ws;
+    vec3 view_ws;
+    vec3 diffuse;       // base colour x (1 - metallic) / pi
+    vec3 f0;
+    float alpha_sq;
+    float n_dot_v;
+    float v_term;       // sqrt of the view half of the Smith term
+};
+
+ShadingPoint shading_point(Surface s) {
+    ShadingPoint p;
+    p.position_ws = s.position_ws;
+    p.normal_ws = s.normal_ws;
+    p.view_ws = view_direction(s.position_ws);
+    p.diffuse = s.base_color * (1.0 - s.metallic) / PI;
+    p.f0 = mix(vec3(0.04), s.base_color, s.metallic);
+    float roughness = clamp(s.roughness, MIN_ROUGHNESS, 1.0);
+    float alpha = roughness * roughness;
+    p.alpha_sq = alpha * alpha;
+    p.n_dot_v = max(dot(p.normal_ws, p.view_ws), 1e-4);
+    p.v_term = sqrt(p.n_dot_v * p.n_dot_v * (1.0 - p.alpha_sq) + p.alpha_sq);
+    return p;
+}
+
+// BRDF times cosine for light from the unit direction l.
+vec3 reflectance(ShadingPoint p, vec3 l) {
+    float n_dot_l = dot(p.normal_ws, l);
+    if (n_dot_l <= 0.0) {
+        return vec3(0.0);
+    }
+    vec3 h = normalize(l + p.view_ws);
+    float n_dot_h = clamp(dot(p.normal_ws, h), 0.0, 1.0);
+    float v_dot_h = clamp(dot(p.view_ws, h), 0.0, 1.0);
+    // Trowbridge-Reitz (GGX)
+    float d = n_dot_h * n_dot_h * (p.alpha_sq - 1.0) + 1.0;
+    float distribution = p.alpha_sq / (PI * d * d);
+    // Smith, height-correlated, divided by 4 (n.l) (n.v)
+    float l_term = sqrt(n_dot_l * n_dot_l * (1.0 - p.alpha_sq) + p.alpha_sq);
+    float visibility = 0.5 / (n_dot_l * p.v_term + p.n_dot_v * l_term);
+    // Schlick
+    float c = 1.0 - v_dot_h;
+    float c2 = c * c;
+    vec3 fresnel = p.f0 + (1.0 - p.f0) * (c2 * c2 * c);
+    return ((1.0 - fresnel) * p.diffuse + fresnel * (distribution * visibility)) * n_dot_l;
+}
+
+// Radiance towards the eye that light number `index` causes; nothing beyond its range.
+vec3 light_radiance(ShadingPoint p, uint index) {
+    vec3 to_light = lights[index].position_ws - p.position_ws;
+    float distance_sq = max(dot(to_light, to_light), 1e-8);
+    float t = distance_sq * lights[index].inverse_range_sq;
+    bool directional = ONLY_POINT_LIGHTS == 0u && lights[index].kind == LIGHT_DIRECTIONAL;
+    if (t >= 1.0 && !directional) {
+        return vec3(0.0);
+    }
+    vec3 l = to_light * inversesqrt(distance_sq);
+    // Inverse square with glTF's window: (1 - (d / range)^4) / d^2
+    float attenuation = (1.0 - t * t) / distance_sq;
+    if (ONLY_POINT_LIGHTS == 0u && lights[index].kind != LIGHT_POINT) {
+        vec3 direction = lights[index].direction_ws;
+        if (directional) {
+            l = -direction;
+            attenuation = 1.0;
+        } else {
+            float angular = clamp(dot(-l, direction) * lights[index].spot_scale + lights[index].spot_offset, 0.0, 1.0);
+            attenuation *= angular * angular;
+        }
+    }
+    return lights[index].intensity * attenuation * reflectance(p, l);
+}
+
+// Radiance that needs no light: emission and the constant ambient term, or the base colour of an unlit surface. A white
+// surface reflects as much as reaches it.
+vec3 unlit_radiance(Surface s) {
+    return s.unlit ? s.base_color : s.emission + s.base_color * s.occlusion * frame.ambient_radiance;
+}
+
+#endif

@@ -1,0 +1,40 @@
+// What a fragment of surface.vert.glsl receives, as a SurfacePoint.
+#ifndef AFTERLIGHT_SURFACE_IN
+#define AFTERLIGHT_SURFACE_IN
+#include "material.glsl"
+
+layout(location = 0) flat in uvec2 draw_material;
+layout(location = 1) in vec4 uv0_uv1;
+layout(location = 2) in vec4 color;
+#ifndef WITH_UV
+layout(location = 3) in vec3 position_ws;
+layout(location = 4) in vec3 normal_ws;
+layout(location = 5) in vec4 tangent_ws;
+#endif
+
+SurfacePoint surface_point() {
+    SurfacePoint p;
+    p.uv0 = TextureCoordinates(uv0_uv1.xy, vec2(0.0), vec2(0.0));
+    p.uv1 = TextureCoordinates(uv0_uv1.zw, vec2(0.0), vec2(0.0));
+    p.color = color;
+    p.front_facing = gl_FrontFacing;
+#ifndef WITH_UV
+    p.position_ws = position_ws;
+    p.normal_ws = normal_ws;
+    p.tangent_ws = tangent_ws;
+#endif
+    return p;
+}
+
+// Base colour of the fragment; with ALPHA_MASK the fragment ends where its alpha is below the cutoff.
+vec4 visible_base_color(MaterialData m, SurfacePoint p) {
+    vec4 base = base_color_at(m, p);
+#ifdef ALPHA_MASK
+    if (base.a < m.alpha_cutoff) {
+        discard;
+    }
+#endif
+    return base;
+}
+
+#endif

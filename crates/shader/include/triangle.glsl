@@ -1,0 +1,109 @@
+// From a triangle ID and a pixel to a SurfacePoint, with analytic derivatives of the texture coordinates.
+//
+// Barycentric coordinates come from homogeneous coordinates relative to the pixel (Olano and Greer 1997), which hold for
+// triangles that cross the plane of the eye. With q_i = (x_i - x w_i, y_i - y w_i) of the clip positions, the pixel at
+// (x, y), the coordinate of vertex 0 is cross(q_1, q_2) over the sum of all three.
+#ifndef AFTERLIGHT_TRIANGLE
+#define AFTERLIGHT_TRIANGLE
+#define EXPLICIT_GRADIENTS
+#include "frame.glsl"
+#include "material.glsl"
+
+layout(set = 0, binding = 1, scalar) readonly buffer Draws {
+    DrawData draws[];
+};
+layout(set = 0, binding = 6, scalar) readonly buffer Positions {
+    float positions_os[];       // three a vertex
+};
+layout(set = 0, binding = 7, scalar) readonly buffer Attributes {
+    uint attributes[];          // seven a vertex: normal, tangent, uv0, uv1, colour
+};
+layout(set = 0, binding = 13, scalar) readonly buffer Indices {
+    uint indices[];
+};
+
+float cross2(vec2 a, vec2 b) {
+    return a.x * b.y - a.y * b.x;
+}
+
+// Perspective-correct barycentric coordinates at a pixel and their derivatives by pixels.
+struct Barycentrics {
+    vec3 at;
+    vec3 ddx;
+    vec3 ddy;
+    bool counter_clockwise; // on the screen
+};
+
+Barycentrics barycentrics_at(vec2 ndc, vec3 p0, vec3 p1, vec3 p2) {   // p: clip x, y, w
+    vec2 q0 = p0.xy - ndc * p0.z, q1 = p1.xy - ndc * p1.z, q2 = p2.xy - ndc * p2.z;
+    vec3 b = vec3(cross2(q1, q2), cross2(q2, q0), cross2(q0, q1));
+    // q moves by (-w, 0) for a step in x and by (0, -w) for one in y
+    vec3 w = vec3(p0.z, p1.z, p2.z);
+    vec3 bx = vec3(w.z * q1.y - w.y * q2.y, w.x * q2.y - w.z * q0.y, w.y * q0.y - w.x * q1.y);
+    vec3 by = vec3(w.y * q2.x - w.z * q1.x, w.z * q0.x - w.x * q2.x, w.x * q1.x - w.y * q0.x);
+    vec2 pixel_ndc = 2.0 / vec2(frame.size_px);
+    float sum = b.x + b.y + b.z;
+    Barycentrics r;
+    r.counter_clockwise = sum < 0.0;
+    float inv = 1.0 / sum;
+    r.at = b * inv;
+    r.ddx = (bx - r.at * (bx.x + bx.y + bx.z)) * (inv * pixel_ndc.x);
+    r.ddy = (by - r.at * (by.x + by.y + by.z)) * (inv * pixel_ndc.y);
+    return r;
+}
+
+vec3 load_position(DrawData d, uint vertex) {
+    uint i = vertex * 3u;
+    return position_to_world(d.object_row0, d.object_row1, d.object_row2,
+                             vec3(positions_os[i], positions_os[i + 1u], positions_os[i + 2u]));
+}
+
+vec3 clip_xyw(vec3 position_ws) {
+    return (frame.clip_from_world * vec4(position_ws, 1.0)).xyw;
+}
+
+TextureCoordinates interpolate_uv(Barycentrics b, vec2 uv0, vec2 uv1, vec2 uv2) {
+    mat3x2 uv = mat3x2(uv0, uv1, uv2);
+    return TextureCoordinates(uv * b.at, uv * b.ddx, uv * b.ddy);
+}
+
+vec2 load_uv(uint attribute, uint offset) {
+    return uintBitsToFloat(uvec2(attributes[attribute + offset], attributes[attribute + offset + 1u]));
+}
+
+SurfacePoint triangle_point(uint id, vec2 ndc, out uint material) {
+    DrawData d = draws[id >> TRIANGLE_BITS];
+    material = d.material;
+    uint first = d.first_index + (id & ((1u << TRIANGLE_BITS) - 1u)) * 3u;
+    uvec3 v = d.first_vertex + uvec3(indices[first], indices[first + 1u], indices[first + 2u]);
+    vec3 p0 = load_position(d, v.x), p1 = load_position(d, v.y), p2 = load_position(d, v.z);
+    Barycentrics b = barycentrics_at(ndc, clip_xyw(p0), clip_xyw(p1), clip_xyw(p2));
+
+    bool mirrored = (d.flags & DRAW_MIRRORED) != 0u;
+    uvec3 a = v * 7u;
+    SurfacePoint p;
+    p.position_ws = b.at.x * p0 + b.at.y * p1 + b.at.z * p2;
+    p.front_facing = b.counter_clockwise != mirrored;
+    p.normal_ws = b.at.x * normal_to_world(d.object_row0, d.object_row1, d.object_row2, mirrored, unpack_normal(attributes[a.x]))
+                + b.at.y * normal_to_world(d.object_row0, d.object_row1, d.object_row2, mirrored, unpack_normal(attributes[a.y]))
+                + b.at.z * normal_to_world(d.object_row0, d.object_row1, d.object_row2, mirrored, unpack_normal(attributes[a.z]));
+    p.tangent_ws = vec4(0.0);
+    if (NORMAL_BUCKETS > 0u) {
+        p.tangent_ws = b.at.x * tangent_to_world(d.object_row0, d.object_row1, d.object_row2, mirrored, unpack_tangent(attributes[a.x + 1u]))
+                     + b.at.y * tangent_to_world(d.object_row0, d.object_row1, d.object_row2, mirrored, unpack_tangent(attributes[a.y + 1u]))
+                     + b.at.z * tangent_to_world(d.object_row0, d.object_row1, d.object_row2, mirrored, unpack_tangent(attributes[a.z + 1u]));
+    }
+    p.uv0 = interpolate_uv(b, load_uv(a.x, 2u), load_uv(a.y, 2u), load_uv(a.z, 2u));
+    p.uv1 = p.uv0;
+    if (HAS_UV1 != 0u) {
+        p.uv1 = interpolate_uv(b, load_uv(a.x, 4u), load_uv(a.y, 4u), load_uv(a.z, 4u));
+    }
+    p.color = vec4(1.0);
+    if (HAS_VERTEX_COLOR != 0u) {
+        p.color = b.at.x * unpackUnorm4x8(attributes[a.x + 6u]) + b.at.y * unpackUnorm4x8(attributes[a.y + 6u])
+                + b.at.z * unpackUnorm4x8(attributes[a.z + 6u]);
+    }
+    return p;
+}
+
+#endif
