@@ -1,0 +1,23 @@
+//! Frame graph: declare, plan (pure), execute; barriers, lifetimes, aliasing, timings, every byte.
+//!
+//! [`Graph`] takes the declaration of a frame: resources, and passes that read and write them by the names that the
+//! shaders use. [`Graph::plan`] turns it, without a device, into a [`Plan`]: passes in order, barriers, lifetimes, places
+//! in memory. The executor makes what a plan needs once and runs it any number of times, and reports time, statistics
+//! and bytes of everything.
+
+mod bind;
+mod declare;
+mod error;
+mod plan;
+
+pub use afterlight_gpu as gpu;
+
+pub use declare::{
+    Blend, BlendEquation, BufferHandle, ComputePass, ConstantBits, DepthTest, Draw, DrawCall, Graph, Handle,
+    ImageHandle, ImageInfo, Load, RasterPass, RasterState, Rect, ResourceId, StencilFace, StencilTest,
+    Subresource, VertexAttribute, VertexLayout, VertexStream,
+};
+pub use error::GraphError;
+pub use plan::{
+    Access, Barrier, MemoryNeed, Placement, Plan, PlannedHeap, PlannedPass, PlannedResource, Requirements,
+};
