@@ -9,7 +9,6 @@
 //! ```
 //! and in the library `include!(concat!(env!("OUT_DIR"), "/shaders.rs"));`, which defines `SHADERS` and `shader(name)`.
 
-use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -63,7 +62,7 @@ impl Builder {
     /// Compiles every variant, in the manifests' order.
     ///
     /// # Errors
-    /// The first [`CompileError`].
+    /// Every [`CompileError`] that there is.
     pub fn compile(&self) -> Result<Vec<Compiled>, CompileError> {
         let variants = self.variants()?;
         let threads = std::thread::available_parallelism().map_or(1, usize::from).min(variants.len().max(1));
@@ -87,35 +86,48 @@ impl Builder {
                 .collect()
         });
         done.sort_by_key(|(index, _)| *index);
-        done.into_iter().map(|(_, result)| result).collect()
+        let (mut compiled, mut errors) = (Vec::new(), Vec::new());
+        for (_, result) in done {
+            match result {
+                Ok(one) => compiled.push(one),
+                Err(error) => errors.push(error),
+            }
+        }
+        match errors.len() {
+            0 => Ok(compiled),
+            1 => Err(errors.remove(0)),
+            _ => Err(CompileError::Several(errors)),
+        }
     }
 
     /// Compiles every variant and writes `shaders.rs`, with the SPIR-V beside it, into `out_dir`; tells Cargo which files
-    /// to watch.
+    /// to watch. Where nothing that shaders are made of changed since the last time, what is there is left as it is.
     ///
     /// # Errors
-    /// The first [`CompileError`]; what was watched so far is told all the same.
+    /// Every [`CompileError`] that there is.
     pub fn emit(&self, out_dir: impl AsRef<Path>) -> Result<(), CompileError> {
-        for (_, folder) in &self.folders {
+        let folders = self.folders.iter().map(|(_, folder)| folder).chain(self.compiler.include_dirs());
+        for folder in folders {
             // The whole folder: a header that did not compile, and one that is new, must start the build again too.
             println!("cargo:rerun-if-changed={}", folder.display());
         }
-        let compiled = self.compile()?;
-        let mut watched = BTreeSet::new();
-        for one in &compiled {
-            watched.extend(&one.dependencies);
+        let (stamp_path, code_path) =
+            (out_dir.as_ref().join("shaders.stamp"), out_dir.as_ref().join("shaders.rs"));
+        let stamp =
+            self.compiler.fingerprint(self.folders.iter().map(|(_, folder)| folder.as_path())).to_string();
+        if code_path.is_file() && std::fs::read_to_string(&stamp_path).is_ok_and(|written| written == stamp) {
+            return Ok(());
         }
-        for path in watched {
-            println!("cargo:rerun-if-changed={}", path.display());
-        }
-        write_shaders(&compiled, out_dir.as_ref())
+        write_shaders(&self.compile()?, out_dir.as_ref())?;
+        write(stamp_path, stamp.as_bytes())
     }
 }
 
+fn write(path: PathBuf, bytes: &[u8]) -> Result<(), CompileError> {
+    std::fs::write(&path, bytes).map_err(|source| CompileError::Write { path, source })
+}
+
 fn write_shaders(compiled: &[Compiled], out_dir: &Path) -> Result<(), CompileError> {
-    let write = |path: PathBuf, bytes: &[u8]| {
-        std::fs::write(&path, bytes).map_err(|source| CompileError::Write { path, source })
-    };
     let mut code = String::from(
         "/// Every compiled variant of this crate's shaders.\n\
          pub static SHADERS: ::std::sync::LazyLock<::std::vec::Vec<::afterlight_shader::Shader>> =\n    \

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeSet, HashMap, HashSet};
 use std::fmt;
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 
 use glslang::include::{IncludeHandler, IncludeResult, IncludeType};
@@ -81,6 +82,9 @@ pub enum CompileError {
         /// The first difference.
         what: String,
     },
+    /// Several variants were not compiled.
+    #[error("{} shaders do not compile\n{}", .0.len(), .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))]
+    Several(Vec<CompileError>),
     /// A file could not be written.
     #[error("{path}: {source}")]
     Write {
@@ -129,6 +133,25 @@ impl Compiler {
         self
     }
 
+    pub(crate) fn include_dirs(&self) -> &[PathBuf] {
+        &self.include_dirs
+    }
+
+    /// Returns a number that changes with anything that compiled shaders depend on: this crate's headers, the layouts, the
+    /// program that runs, and every file of `folders` and of the include folders that is not Rust.
+    pub(crate) fn fingerprint<'a>(&'a self, folders: impl Iterator<Item = &'a Path>) -> u64 {
+        let mut hasher = DefaultHasher::new();
+        INCLUDES.hash(&mut hasher);
+        format!("{:?}", self.layouts).hash(&mut hasher);
+        let program =
+            std::env::current_exe().and_then(std::fs::metadata).and_then(|metadata| metadata.modified());
+        format!("{program:?}").hash(&mut hasher);
+        for folder in folders.chain(self.include_dirs.iter().map(PathBuf::as_path)) {
+            hash_folder(folder, &mut hasher);
+        }
+        hasher.finish()
+    }
+
     /// Compiles a variant's file.
     ///
     /// # Errors
@@ -153,6 +176,20 @@ impl Compiler {
     }
 }
 
+fn hash_folder(folder: &Path, hasher: &mut DefaultHasher) {
+    let mut paths: Vec<PathBuf> =
+        std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path()).collect();
+    paths.sort();
+    for path in paths {
+        if path.is_dir() {
+            hash_folder(&path, hasher);
+        } else if path.extension().is_none_or(|extension| extension != "rs") {
+            path.hash(hasher);
+            std::fs::read(&path).ok().hash(hasher);
+        }
+    }
+}
+
 fn to_spirv(variant: &Variant, source: &str, includer: &mut Includer) -> Result<Vec<u32>, CompileError> {
     let file = display_path(&variant.path);
     let glsl_error = |log: String| CompileError::Glsl {
@@ -164,7 +201,7 @@ fn to_spirv(variant: &Variant, source: &str, includer: &mut Includer) -> Result<
         return Err(glsl_error(format!("ERROR: 0:{line}: found a zero byte, expected GLSL text")));
     }
     let compiler = Glslang::acquire().ok_or(CompileError::NoCompiler)?;
-    let text = ShaderSource::from(source);
+    let text = ShaderSource::from(with_preamble(source, &variant.defines));
     let options = CompilerOptions {
         source_language: SourceLanguage::GLSL,
         // SPIR-V 1.5 rather than 1.6: work-group sizes then stay literal (1.6 needs maintenance4 for its form of them).
@@ -172,18 +209,37 @@ fn to_spirv(variant: &Variant, source: &str, includer: &mut Includer) -> Result<
         version_profile: None::<(i32, GlslProfile)>,
         messages: ShaderMessage::DEFAULT | ShaderMessage::VULKAN_RULES | ShaderMessage::SPV_RULES,
     };
-    let defines: Vec<(&str, Option<&str>)> = variant
-        .defines
-        .iter()
-        .map(|(name, value)| (name.as_str(), Some(value.as_deref().unwrap_or("1"))))
-        .collect();
     let stage = glslang_stage(variant.stage);
-    let input = ShaderInput::new(&text, stage, &options, Some(&defines), Some(includer))
+    let input = ShaderInput::new(&text, stage, &options, None::<&[(&str, Option<&str>)]>, Some(includer))
         .map_err(|error| glsl_error(error.to_string()))?;
-    let mut builder = glslang::Shader::new(compiler, input);
-    builder.preamble(PREAMBLE);
-    let shader = builder.parse().map_err(|error| glsl_error(error.to_string()))?;
+    let shader =
+        glslang::Shader::new(compiler, input).parse().map_err(|error| glsl_error(error.to_string()))?;
     shader.compile().map_err(|error| glsl_error(error.to_string()))
+}
+
+/// Puts the preamble and the macros after the `#version` line (which is added where it lacks) without moving the numbers
+/// of the lines that follow. glslang's own preamble does not serve: its extensions would come before `#version`.
+fn with_preamble(source: &str, defines: &[(String, Option<String>)]) -> String {
+    let version_line = source.lines().position(|line| line.trim_start().starts_with("#version"));
+    let head_lines = version_line.map_or(0, |line| line + 1);
+    let mut text = String::with_capacity(source.len() + 256);
+    if version_line.is_none() {
+        text.push_str("#version 460\n");
+    }
+    for line in source.lines().take(head_lines) {
+        text.push_str(line);
+        text.push('\n');
+    }
+    text.push_str(PREAMBLE);
+    for (name, value) in defines {
+        text.push_str(&format!("#define {name} {}\n", value.as_deref().unwrap_or("1")));
+    }
+    text.push_str(&format!("#line {}\n", head_lines + 1));
+    for line in source.lines().skip(head_lines) {
+        text.push_str(line);
+        text.push('\n');
+    }
+    text
 }
 
 fn glslang_stage(stage: Stage) -> ShaderStage {

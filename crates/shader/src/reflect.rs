@@ -66,6 +66,9 @@ mod storage {
 
 const EXECUTION_MODE_LOCAL_SIZE: u32 = 17;
 
+/// More locations than any device has: a guard against broken modules.
+const MAX_LOCATIONS: usize = 1024;
+
 /// Why SPIR-V could not be read.
 #[derive(Debug, thiserror::Error, PartialEq)]
 pub enum ReflectError {
@@ -234,24 +237,28 @@ impl Module {
             op::MEMBER_DECORATE => {
                 self.member_decorations.insert((at(1)?, at(2)?, at(3)?), words.get(4).copied().unwrap_or(1));
             }
-            op::TYPE_BOOL => self.define(at(1)?, Type::Scalar { scalar: Scalar::Bool, bytes: 4 }),
+            op::TYPE_BOOL => self.define(at(1)?, Type::Scalar { scalar: Scalar::Bool, bytes: 4 })?,
             op::TYPE_INT => {
                 let scalar = if at(3)? == 0 { Scalar::Uint } else { Scalar::Int };
-                self.define(at(1)?, Type::Scalar { scalar, bytes: at(2)? / 8 });
+                self.define(at(1)?, Type::Scalar { scalar, bytes: at(2)? / 8 })?;
             }
-            op::TYPE_FLOAT => self.define(at(1)?, Type::Scalar { scalar: Scalar::Float, bytes: at(2)? / 8 }),
-            op::TYPE_VECTOR => self.define(at(1)?, Type::Vector { component: at(2)?, count: at(3)? }),
-            op::TYPE_MATRIX => self.define(at(1)?, Type::Matrix { column: at(2)?, count: at(3)? }),
+            op::TYPE_FLOAT => {
+                self.define(at(1)?, Type::Scalar { scalar: Scalar::Float, bytes: at(2)? / 8 })?
+            }
+            op::TYPE_VECTOR => self.define(at(1)?, Type::Vector { component: at(2)?, count: at(3)? })?,
+            op::TYPE_MATRIX => self.define(at(1)?, Type::Matrix { column: at(2)?, count: at(3)? })?,
             op::TYPE_IMAGE => self.define(
                 at(1)?,
                 Type::Image { dim: at(3)?, arrayed: at(5)? != 0, multisampled: at(6)? != 0, sampled: at(7)? },
-            ),
-            op::TYPE_SAMPLER => self.define(at(1)?, Type::Sampler),
-            op::TYPE_SAMPLED_IMAGE => self.define(at(1)?, Type::SampledImage { image: at(2)? }),
-            op::TYPE_ARRAY => self.define(at(1)?, Type::Array { element: at(2)?, length: at(3)? }),
-            op::TYPE_RUNTIME_ARRAY => self.define(at(1)?, Type::RuntimeArray { element: at(2)? }),
-            op::TYPE_STRUCT => self.define(at(1)?, Type::Struct { members: words[2..].to_vec() }),
-            op::TYPE_POINTER => self.define(at(1)?, Type::Pointer { pointee: at(3)? }),
+            )?,
+            op::TYPE_SAMPLER => self.define(at(1)?, Type::Sampler)?,
+            op::TYPE_SAMPLED_IMAGE => self.define(at(1)?, Type::SampledImage { image: at(2)? })?,
+            op::TYPE_ARRAY => self.define(at(1)?, Type::Array { element: at(2)?, length: at(3)? })?,
+            op::TYPE_RUNTIME_ARRAY => self.define(at(1)?, Type::RuntimeArray { element: at(2)? })?,
+            op::TYPE_STRUCT => {
+                self.define(at(1)?, Type::Struct { members: words.get(2..).unwrap_or(&[]).to_vec() })?
+            }
+            op::TYPE_POINTER => self.define(at(1)?, Type::Pointer { pointee: at(3)? })?,
             op::CONSTANT => {
                 self.constants.insert(at(2)?, at(3)?);
             }
@@ -269,8 +276,26 @@ impl Module {
         Ok(())
     }
 
-    fn define(&mut self, id: u32, definition: Type) {
-        self.types.insert(id, definition);
+    /// Adds a type; each id is defined once and after what it is made of, so that types have no cycles.
+    fn define(&mut self, id: u32, definition: Type) -> Result<(), ReflectError> {
+        let parts = match &definition {
+            Type::Vector { component: part, .. }
+            | Type::Matrix { column: part, .. }
+            | Type::SampledImage { image: part }
+            | Type::Array { element: part, .. }
+            | Type::RuntimeArray { element: part } => std::slice::from_ref(part),
+            Type::Struct { members } => members,
+            Type::Scalar { .. } | Type::Image { .. } | Type::Sampler | Type::Pointer { .. } => &[],
+        };
+        if let Some(part) = parts.iter().find(|part| !self.types.contains_key(part)) {
+            return Err(ReflectError::Malformed {
+                what: format!("type {id} is made of {part}, not defined yet"),
+            });
+        }
+        match self.types.insert(id, definition) {
+            None => Ok(()),
+            Some(_) => Err(ReflectError::Malformed { what: format!("type {id} is defined twice") }),
+        }
     }
 
     fn type_of(&self, id: u32) -> Result<&Type, ReflectError> {
@@ -312,7 +337,7 @@ impl Module {
         Ok(match self.type_of(id)? {
             Type::Scalar { bytes, .. } => Some(*bytes),
             Type::Vector { component, count } => {
-                self.size_bytes(*component, None, false)?.map(|bytes| bytes * count)
+                self.size_bytes(*component, None, false)?.map(|bytes| bytes.saturating_mul(*count))
             }
             Type::Matrix { column, count } => {
                 let rows = match self.type_of(*column)? {
@@ -320,13 +345,15 @@ impl Module {
                     _ => 1,
                 };
                 let stride = matrix_stride.unwrap_or(0);
-                Some(stride * if row_major { rows } else { *count })
+                Some(stride.saturating_mul(if row_major { rows } else { *count }))
             }
             Type::Array { element, length } => {
                 let length = self.constant(*length)?;
                 match self.decoration(id, decoration::ARRAY_STRIDE) {
-                    Some(stride) => Some(stride * length),
-                    None => self.size_bytes(*element, matrix_stride, row_major)?.map(|bytes| bytes * length),
+                    Some(stride) => Some(stride.saturating_mul(length)),
+                    None => self
+                        .size_bytes(*element, matrix_stride, row_major)?
+                        .map(|bytes| bytes.saturating_mul(length)),
                 }
             }
             Type::Struct { members } => {
@@ -334,7 +361,7 @@ impl Module {
                 for (index, _) in members.iter().enumerate() {
                     let (offset, size) = self.member_extent(id, members, index)?;
                     let Some(size) = size else { return Ok(None) };
-                    end = end.max(offset + size);
+                    end = end.max(offset.saturating_add(size));
                 }
                 Some(end)
             }
@@ -363,7 +390,7 @@ impl Module {
         self.names.get(&id).map_or("", String::as_str)
     }
 
-    /// The variable's name, or that of its block.
+    /// The variable's name; where it has none, that of its block's only member, or the block's.
     fn variable_name(&self, variable: &Variable, pointee: u32) -> Text {
         let name = self.name(variable.id);
         if !name.is_empty() {
@@ -374,7 +401,11 @@ impl Module {
         {
             block = *element;
         }
-        self.name(block).into()
+        let only_member = match self.types.get(&block) {
+            Some(Type::Struct { members }) if members.len() == 1 => self.member_names.get(&(block, 0)),
+            _ => None,
+        };
+        only_member.map_or(self.name(block), String::as_str).into()
     }
 
     /// Whether every member of a block, or the variable itself, carries the decoration.
@@ -480,10 +511,15 @@ impl Module {
         name: &Text,
         list: &mut Vec<Interface>,
     ) -> Result<u32, ReflectError> {
+        if list.len() > MAX_LOCATIONS {
+            return Err(ReflectError::Malformed {
+                what: format!("`{name}` takes more than {MAX_LOCATIONS} locations"),
+            });
+        }
         match self.type_of(id)? {
             Type::Scalar { scalar, .. } => {
                 list.push(Interface { location, name: name.clone(), components: 1, scalar: *scalar });
-                Ok(location + 1)
+                Ok(location.saturating_add(1))
             }
             Type::Vector { component, count } => {
                 let scalar = match self.type_of(*component)? {
@@ -491,12 +527,11 @@ impl Module {
                     _ => Scalar::Float,
                 };
                 list.push(Interface { location, name: name.clone(), components: *count, scalar });
-                Ok(location + 1)
+                Ok(location.saturating_add(1))
             }
-            Type::Matrix { column, count } => {
-                (0..*count).try_fold(location, |location, _| self.locations(*column, location, name, list))
-            }
-            Type::Array { element, length } => (0..self.constant(*length)?)
+            Type::Matrix { column, count } => (0..(*count).min(4))
+                .try_fold(location, |location, _| self.locations(*column, location, name, list)),
+            Type::Array { element, length } => (0..self.constant(*length)?.min(MAX_LOCATIONS as u32))
                 .try_fold(location, |location, _| self.locations(*element, location, name, list)),
             Type::Struct { members } => members
                 .iter()
