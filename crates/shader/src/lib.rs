@@ -208,7 +208,7 @@ pub struct Binding {
     pub set: u32,
     /// Binding within the set.
     pub binding: u32,
-    /// The instance's name; where a block's instance has none, the name of its only member, or else the block's.
+    /// The instance's name, or the block's where the instance has none.
     pub name: Text,
     /// What it is.
     pub kind: BindingKind,

@@ -390,7 +390,7 @@ impl Module {
         self.names.get(&id).map_or("", String::as_str)
     }
 
-    /// The variable's name; where it has none, that of its block's only member, or the block's.
+    /// The variable's name, or that of its block.
     fn variable_name(&self, variable: &Variable, pointee: u32) -> Text {
         let name = self.name(variable.id);
         if !name.is_empty() {
@@ -401,11 +401,7 @@ impl Module {
         {
             block = *element;
         }
-        let only_member = match self.types.get(&block) {
-            Some(Type::Struct { members }) if members.len() == 1 => self.member_names.get(&(block, 0)),
-            _ => None,
-        };
-        only_member.map_or(self.name(block), String::as_str).into()
+        self.name(block).into()
     }
 
     /// Whether every member of a block, or the variable itself, carries the decoration.

@@ -95,7 +95,7 @@ fn compute_shader_is_reflected() {
         bindings,
         [
             (0, 0, "frame", UniformBuffer, 1, true, false),
-            (0, 1, "lamps", StorageBuffer, 1, true, false),
+            (0, 1, "LampBlock", StorageBuffer, 1, true, false),
             (0, 2, "written", StorageBuffer, 1, false, true),
             (0, 3, "hdr_out", StorageImage, 1, false, true),
             (0, 4, "both", StorageImage, 1, true, true),
