@@ -1,0 +1,277 @@
+//! The JSON of `compare` and `bench`.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use crate::Spread;
+
+/// Version of the JSON that [`Run`] is written as.
+pub const SCHEMA: u32 = 1;
+
+/// What stands for the infinite PSNR of two equal images, since JSON has no infinity. Every other PSNR of 8-bit images is
+/// far below: one channel of one pixel off by one in 65,536² pixels gives 150 dB.
+pub const PSNR_IDENTICAL_DB: f64 = 999.0;
+
+/// Named numbers.
+pub type Counters = BTreeMap<String, Value>;
+
+/// A run of one or more techniques over one scene.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Run {
+    /// [`SCHEMA`].
+    pub schema: u32,
+    /// Where it ran.
+    pub device: DeviceRecord,
+    /// What was rendered.
+    pub scene: SceneRecord,
+    /// How.
+    pub settings: SettingsRecord,
+    /// One a technique.
+    pub results: Vec<RunResult>,
+}
+
+/// A Vulkan device.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DeviceRecord {
+    /// Its name.
+    pub name: String,
+    /// Its driver and the driver's version.
+    pub driver: String,
+    /// Vulkan version.
+    pub api: String,
+    /// `cpu`, `discrete`, `integrated`, `virtual` or `other`.
+    #[serde(rename = "type")]
+    pub kind: String,
+}
+
+/// A scene's size.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SceneRecord {
+    /// File or built-in name.
+    pub name: String,
+    /// Triangles of all draws.
+    pub triangles: u64,
+    /// Draws.
+    pub draws: u64,
+    /// Lights that shaded it.
+    pub lights: u64,
+}
+
+/// Settings that all techniques of a run share.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SettingsRecord {
+    /// Image width, pixels.
+    pub width: u32,
+    /// Image height, pixels.
+    pub height: u32,
+    /// Samples a pixel.
+    pub samples: u32,
+    /// Frames measured after a warm-up frame.
+    pub frames: u32,
+    /// Camera.
+    pub camera: String,
+    /// Technique that images are compared to.
+    pub reference: String,
+    /// Seed of the lights; none where the scene's own lights shade.
+    pub light_seed: Option<u64>,
+    /// Version of the program.
+    pub version: String,
+}
+
+/// How a technique's run ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Status {
+    /// It ran, and its image is within its bound.
+    Ok,
+    /// The device cannot run it.
+    Unavailable,
+    /// It broke off, or its image is off.
+    Failed,
+}
+
+/// One technique's figures.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RunResult {
+    /// Its id.
+    pub technique: String,
+    /// Every parameter with its value.
+    pub params: BTreeMap<String, Value>,
+    /// How it ended.
+    pub status: Status,
+    /// Why it is not `ok`.
+    pub reason: Option<String>,
+    /// GPU time of a frame, ms.
+    pub frame_ms: Option<Spread>,
+    /// CPU time to record a frame's commands, ms.
+    pub record_ms: Option<Spread>,
+    /// Its passes in order.
+    pub passes: Vec<Pass>,
+    /// What it allocates.
+    pub memory: Option<Memory>,
+    /// What it counts.
+    pub counters: Counters,
+    /// Predicted costs.
+    pub cost: Option<CostRecord>,
+    /// How far its image is from the reference's.
+    pub difference: Option<Difference>,
+}
+
+impl RunResult {
+    /// Returns a result without figures.
+    pub fn without_figures(technique: &str, status: Status, reason: impl Into<String>) -> RunResult {
+        RunResult {
+            technique: technique.to_owned(),
+            params: BTreeMap::new(),
+            status,
+            reason: Some(reason.into()),
+            frame_ms: None,
+            record_ms: None,
+            passes: Vec::new(),
+            memory: None,
+            counters: Counters::new(),
+            cost: None,
+            difference: None,
+        }
+    }
+}
+
+/// One pass of a frame.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Pass {
+    /// `technique/stage`, or `shared/stage` for work that is not the technique's own.
+    pub name: String,
+    /// GPU time, ms.
+    pub ms: Option<Spread>,
+    /// Pipeline statistics of one frame (`fragment_invocations`, `vertex_invocations`, …), beside the other fields.
+    #[serde(flatten)]
+    pub statistics: BTreeMap<String, u64>,
+}
+
+/// What a technique allocates, bytes as the allocator counts them.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Memory {
+    /// What it adds to the final colour target.
+    pub technique_bytes: u64,
+    /// What is allocated at once, with resources that share memory counted once.
+    pub peak_bytes: u64,
+    /// Every buffer and image of its own.
+    pub buffers: Vec<Buffer>,
+}
+
+/// A buffer or image.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Buffer {
+    /// Its name.
+    pub name: String,
+    /// Its size, bytes.
+    pub bytes: u64,
+}
+
+/// Predicted costs of a frame (Petrescu et al. 2016, section 4).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CostRecord {
+    /// Commands given to the device.
+    pub cmd: f64,
+    /// Processing.
+    pub proc: f64,
+    /// Memory, bytes.
+    pub mem: f64,
+    /// Memory traffic, bytes.
+    pub band: f64,
+}
+
+/// Difference of two images after tone mapping, 8 bits a channel.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Difference {
+    /// Peak signal-to-noise ratio, dB; [`PSNR_IDENTICAL_DB`] for equal images.
+    pub psnr_db: f64,
+    /// Greatest difference of a channel, 0 to 255.
+    pub max_abs: u32,
+    /// Mean FLIP error, 0 to 1.
+    pub flip: Option<f64>,
+}
+
+impl Difference {
+    /// Returns the PSNR with equal images as infinity.
+    pub fn psnr_or_infinity_db(&self) -> f64 {
+        if self.psnr_db >= PSNR_IDENTICAL_DB { f64::INFINITY } else { self.psnr_db }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn run() -> Run {
+        let mut result = RunResult::without_figures("tiled", Status::Ok, "");
+        result.reason = None;
+        result.frame_ms = Spread::of(&[1.0, 2.0, 4.0]);
+        result.passes = vec![Pass {
+            name: "tiled/shade".into(),
+            ms: Spread::of(&[1.0]),
+            statistics: BTreeMap::from([("fragment_invocations".into(), 7)]),
+        }];
+        result.memory = Some(Memory {
+            technique_bytes: 10,
+            peak_bytes: 20,
+            buffers: vec![Buffer { name: "tiled/list".into(), bytes: 10 }],
+        });
+        result.cost = Some(CostRecord { cmd: 1.0, proc: 2.0, mem: 3.0, band: 4.0 });
+        result.difference = Some(Difference { psnr_db: 51.5, max_abs: 2, flip: Some(0.001) });
+        Run {
+            schema: SCHEMA,
+            device: DeviceRecord {
+                name: "llvmpipe".into(),
+                driver: "Mesa".into(),
+                api: "1.3.230".into(),
+                kind: "cpu".into(),
+            },
+            scene: SceneRecord { name: "s".into(), triangles: 1, draws: 2, lights: 3 },
+            settings: SettingsRecord {
+                width: 4,
+                height: 5,
+                samples: 1,
+                frames: 3,
+                camera: "0".into(),
+                reference: "forward".into(),
+                light_seed: Some(1),
+                version: "0".into(),
+            },
+            results: vec![result],
+        }
+    }
+
+    #[test]
+    fn json_has_the_names_of_the_contract() {
+        let json: Value = serde_json::to_value(run()).expect("is JSON");
+        assert_eq!(json["schema"], 1);
+        assert_eq!(json["device"]["type"], "cpu");
+        assert_eq!(json["scene"]["triangles"], 1);
+        assert_eq!(json["settings"]["frames"], 3);
+        let result = &json["results"][0];
+        assert_eq!((&result["technique"], &result["status"]), (&"tiled".into(), &"ok".into()));
+        assert!(result["reason"].is_null());
+        assert_eq!(result["frame_ms"], serde_json::json!({"median": 2.0, "min": 1.0, "max": 4.0}));
+        assert_eq!(result["passes"][0]["fragment_invocations"], 7);
+        assert_eq!(result["passes"][0]["ms"]["median"], 1.0);
+        assert_eq!(result["memory"]["buffers"][0]["bytes"], 10);
+        assert_eq!(result["cost"]["band"], 4.0);
+        assert_eq!(result["difference"]["psnr_db"], 51.5);
+    }
+
+    #[test]
+    fn json_reads_back() {
+        let text = serde_json::to_string(&run()).expect("is JSON");
+        assert_eq!(serde_json::from_str::<Run>(&text).expect("reads"), run());
+    }
+
+    #[test]
+    fn equal_images_are_infinite() {
+        let same = Difference { psnr_db: PSNR_IDENTICAL_DB, max_abs: 0, flip: None };
+        assert!(same.psnr_or_infinity_db().is_infinite());
+        assert_eq!(Difference { psnr_db: 60.0, ..same }.psnr_or_infinity_db(), 60.0);
+    }
+}

@@ -1,0 +1,68 @@
+//! Summaries of repeated measurements.
+
+use serde::{Deserialize, Serialize};
+
+/// Median, least and greatest of repeated measurements.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Spread {
+    /// The middle one; the mean of the two middle ones where their number is even.
+    pub median: f64,
+    /// The least.
+    pub min: f64,
+    /// The greatest.
+    pub max: f64,
+}
+
+impl Spread {
+    /// Summarises samples; none where there is no finite one.
+    ///
+    /// ```
+    /// use afterlight_measure::Spread;
+    /// assert_eq!(Spread::of(&[3.0, 1.0, 2.0, 10.0]), Some(Spread { median: 2.5, min: 1.0, max: 10.0 }));
+    /// assert_eq!(Spread::of(&[]), None);
+    /// ```
+    pub fn of(samples: &[f64]) -> Option<Spread> {
+        let mut sorted: Vec<f64> = samples.iter().copied().filter(|sample| sample.is_finite()).collect();
+        sorted.sort_by(f64::total_cmp);
+        let (min, max) = (*sorted.first()?, *sorted.last()?);
+        let middle = sorted.len() / 2;
+        let median = match sorted.len() % 2 {
+            1 => sorted[middle],
+            _ => (sorted[middle - 1] + sorted[middle]) / 2.0,
+        };
+        Some(Spread { median, min, max })
+    }
+
+    /// Summarises nanoseconds as milliseconds.
+    pub fn of_ns(samples_ns: &[u64]) -> Option<Spread> {
+        let samples_ms: Vec<f64> = samples_ns.iter().map(|ns| *ns as f64 / 1e6).collect();
+        Spread::of(&samples_ms)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn odd_even_and_single() {
+        assert_eq!(Spread::of(&[5.0]), Some(Spread { median: 5.0, min: 5.0, max: 5.0 }));
+        assert_eq!(Spread::of(&[5.0, 1.0, 3.0]), Some(Spread { median: 3.0, min: 1.0, max: 5.0 }));
+        assert_eq!(Spread::of(&[4.0, 1.0]), Some(Spread { median: 2.5, min: 1.0, max: 4.0 }));
+    }
+
+    #[test]
+    fn what_is_not_finite_is_left_out() {
+        assert_eq!(
+            Spread::of(&[f64::NAN, 2.0, f64::INFINITY]),
+            Some(Spread { median: 2.0, min: 2.0, max: 2.0 })
+        );
+        assert_eq!(Spread::of(&[f64::NAN]), None);
+    }
+
+    #[test]
+    fn nanoseconds_become_milliseconds() {
+        let spread = Spread::of_ns(&[1_500_000, 2_500_000]);
+        assert_eq!(spread, Some(Spread { median: 2.0, min: 1.5, max: 2.5 }));
+    }
+}
