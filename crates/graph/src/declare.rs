@@ -813,7 +813,6 @@ impl Graph {
 
     fn add(&mut self, name: &str, kind: ResourceKind, import: Option<Import>) -> ResourceId {
         let bad = match &kind {
-            ResourceKind::Buffer { bytes: 0 } => Some(("size", "0 bytes".to_owned(), "at least 1 byte")),
             ResourceKind::Image(info) if info.width == 0 || info.height == 0 => {
                 Some(("extent", format!("{}x{}", info.width, info.height), "at least 1x1"))
             }
@@ -861,14 +860,14 @@ impl Graph {
     /// Brings in an image that lives outside the graph and is in `layout` before each frame; the frame leaves it in that
     /// layout again (with `UNDEFINED` its contents are dropped before, and its layout after is that of its last use).
     pub fn import_image(&mut self, name: &str, image: &gpu::Image, layout: vk::ImageLayout) -> ImageHandle {
-        let desc = image.desc();
+        let [width, height] = image.extent();
         let info = ImageInfo {
-            format: desc.format,
-            width: desc.width,
-            height: desc.height,
-            layers: desc.layers,
-            mips: desc.mips,
-            samples: desc.samples,
+            format: image.format(),
+            width,
+            height,
+            layers: image.layers(),
+            mips: image.mips(),
+            samples: image.samples(),
         };
         let import = Import::Image { image: image.clone(), layout };
         let resource = self.add(name, ResourceKind::Image(info), Some(import));

@@ -9,6 +9,8 @@ mod bind;
 mod declare;
 mod error;
 mod plan;
+#[cfg(test)]
+mod tests;
 
 pub use afterlight_gpu as gpu;
 
