@@ -1,0 +1,365 @@
+//! Choosing and opening a device; what all resources share.
+
+use crate::descriptor::{SetLayoutCache, SlotLayout};
+use crate::encoder::{Completed, Encoder, Recorder};
+use crate::features::Detected;
+use crate::instance::Instance;
+use crate::pipeline::PipelineStore;
+use crate::sampler::SamplerStore;
+use crate::{DeviceInfo, Features, GpuError, cache};
+use ash::{ext, khr, vk};
+use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
+use std::ffi::CString;
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// How to open a device.
+#[derive(Clone, Debug, Default)]
+pub struct DeviceOptions {
+    /// An index in the loader's order, or a part of the name in any case; `None` takes the most able device.
+    pub select: Option<String>,
+    /// Turn on the validation layer with synchronization checks; see [`Device::validation_messages`].
+    pub validate: bool,
+    /// Folder of the pipeline cache; `None` keeps it in memory. A file that is corrupt or of another driver is ignored.
+    pub pipeline_cache_dir: Option<PathBuf>,
+}
+
+/// An open device. Cloning is cheap; the device closes when the last clone and the last resource of it are gone.
+#[derive(Clone)]
+pub struct Device(pub(crate) Arc<DeviceInner>);
+
+pub(crate) struct DeviceInner {
+    pub raw: ash::Device,
+    pub push: khr::push_descriptor::Device,
+    pub debug: Option<ext::debug_utils::Device>,
+    pub info: DeviceInfo,
+    pub features: Features,
+    pub physical: vk::PhysicalDevice,
+    pub memory: vk::PhysicalDeviceMemoryProperties,
+    pub queue_family: u32,
+    queue: Mutex<vk::Queue>,
+    /// `None` only while the device is being dropped.
+    allocator: Mutex<Option<Allocator>>,
+    pub set_layouts: SetLayoutCache,
+    pub pipelines: PipelineStore,
+    pub samplers: SamplerStore,
+    /// Command pools, query pools and fences that no encoder uses at the moment.
+    recorders: Mutex<Vec<Recorder>>,
+    /// Dropped last: everything above is a child of it.
+    pub instance: Instance,
+}
+
+/// Locks `mutex`; a panic elsewhere leaves the guarded data of this crate whole, so poison is no reason to stop.
+pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl std::fmt::Debug for Device {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_tuple("Device").field(&self.0.info.name).finish()
+    }
+}
+
+impl Device {
+    /// Lists the devices in the loader's order: what each is, what it can do, and what it lacks that the workbench needs
+    /// (nothing where it can be opened).
+    ///
+    /// # Errors
+    /// [`GpuError::NoLoader`] without a Vulkan loader. No device at all is an empty list.
+    pub fn enumerate() -> Result<Vec<(DeviceInfo, Features, Vec<&'static str>)>, GpuError> {
+        let devices = match Instance::new(false) {
+            Ok(instance) => instance.devices()?,
+            Err(GpuError::NoDevice { .. }) => return Ok(Vec::new()),
+            Err(error) => return Err(error),
+        };
+        Ok(devices.into_iter().map(|(_, d)| (d.info, d.features, d.missing)).collect())
+    }
+
+    /// Opens the device that `options` select.
+    ///
+    /// # Errors
+    /// [`GpuError::NoLoader`], [`GpuError::NoDevice`] with the list of devices, [`GpuError::MissingFeature`],
+    /// [`GpuError::NoValidationLayer`].
+    pub fn open(options: &DeviceOptions) -> Result<Device, GpuError> {
+        let instance = Instance::new(options.validate)?;
+        let (physical, detected) = choose(instance.devices()?, options.select.as_deref())?;
+        if !detected.missing.is_empty() {
+            return Err(GpuError::MissingFeature {
+                device: detected.info.name,
+                missing: detected.missing.join(", "),
+            });
+        }
+        let raw = create_device(&instance, physical, &detected)?;
+        // SAFETY: the device was created with one queue of this family.
+        let queue = unsafe { raw.get_device_queue(detected.queue_family, 0) };
+        let allocator = Allocator::new(&AllocatorCreateDesc {
+            instance: instance.raw.clone(),
+            device: raw.clone(),
+            physical_device: physical,
+            debug_settings: Default::default(),
+            buffer_device_address: detected.features.buffer_device_address,
+            allocation_sizes: Default::default(),
+        });
+        let allocator = match allocator {
+            Ok(allocator) => allocator,
+            Err(error) => {
+                // SAFETY: nothing has been made of the device yet.
+                unsafe { raw.destroy_device(None) };
+                return Err(GpuError::MissingFeature {
+                    device: detected.info.name,
+                    missing: error.to_string(),
+                });
+            }
+        };
+        let Detected { info, features, queue_family, .. } = detected;
+        let pipelines = PipelineStore::new(&raw, &info, options.pipeline_cache_dir.as_deref());
+        // SAFETY: `physical` belongs to the instance.
+        let memory = unsafe { instance.raw.get_physical_device_memory_properties(physical) };
+        Ok(Device(Arc::new(DeviceInner {
+            push: khr::push_descriptor::Device::new(&instance.raw, &raw),
+            debug: instance.has_debug_utils.then(|| ext::debug_utils::Device::new(&instance.raw, &raw)),
+            info,
+            features,
+            physical,
+            memory,
+            queue_family,
+            queue: Mutex::new(queue),
+            allocator: Mutex::new(Some(allocator)),
+            set_layouts: SetLayoutCache::default(),
+            pipelines,
+            samplers: SamplerStore::default(),
+            recorders: Mutex::new(Vec::new()),
+            raw,
+            instance,
+        })))
+    }
+
+    /// Which device it is.
+    pub fn info(&self) -> &DeviceInfo {
+        &self.0.info
+    }
+
+    /// What the device can do; what is true there is enabled.
+    pub fn features(&self) -> &Features {
+        &self.0.features
+    }
+
+    /// Waits until the device has nothing left to do.
+    ///
+    /// # Errors
+    /// [`GpuError::DeviceLost`].
+    pub fn wait_idle(&self) -> Result<(), GpuError> {
+        let _queue = lock(&self.0.queue);
+        // SAFETY: the queue is locked, as `vkDeviceWaitIdle` asks.
+        unsafe { self.0.raw.device_wait_idle() }.map_err(lost("vkDeviceWaitIdle", "unknown"))
+    }
+
+    /// Takes the warnings and errors that validation has collected, without repeats; always empty without validation.
+    pub fn validation_messages(&self) -> Vec<String> {
+        self.0.instance.log.drain()
+    }
+
+    /// Writes the pipeline cache to its folder, beside first and then renamed. Without a folder it does nothing.
+    /// Dropping the device saves too, but cannot report an error.
+    ///
+    /// # Errors
+    /// [`GpuError::CacheFile`] with the path and the reason.
+    pub fn save_pipeline_cache(&self) -> Result<(), GpuError> {
+        self.0.pipelines.save(&self.0.raw, &self.0.info)
+    }
+
+    /// Whether images of `format` with optimal tiling have all of `wanted`.
+    pub fn format_supports(&self, format: vk::Format, wanted: vk::FormatFeatureFlags) -> bool {
+        // SAFETY: the physical device belongs to the instance, both alive.
+        let properties =
+            unsafe { self.0.instance.raw.get_physical_device_format_properties(self.0.physical, format) };
+        properties.optimal_tiling_features.contains(wanted)
+    }
+
+    /// The device's format for depth with stencil: 32-bit float depth where it can be drawn to, else 24-bit.
+    pub fn depth_stencil_format(&self) -> vk::Format {
+        let wanted = vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT | vk::FormatFeatureFlags::SAMPLED_IMAGE;
+        if self.format_supports(vk::Format::D32_SFLOAT_S8_UINT, wanted) {
+            vk::Format::D32_SFLOAT_S8_UINT
+        } else {
+            vk::Format::D24_UNORM_S8_UINT
+        }
+    }
+
+    /// Begins to record commands.
+    ///
+    /// # Errors
+    /// A driver that cannot give a command pool.
+    pub fn encoder(&self) -> Result<Encoder, GpuError> {
+        let idle = lock(&self.0.recorders).pop();
+        let recorder = match idle {
+            Some(recorder) => recorder,
+            None => Recorder::new(self)?,
+        };
+        Encoder::new(self.clone(), recorder)
+    }
+
+    /// Submits what `encoder` recorded, waits for it and returns its timestamps and statistics.
+    ///
+    /// # Errors
+    /// [`GpuError::DeviceLost`] with the last label whose end was reached; a recording that the driver refuses.
+    pub fn submit(&self, encoder: Encoder) -> Result<Completed, GpuError> {
+        encoder.submit_and_wait()
+    }
+
+    pub(crate) fn give_back(&self, recorder: Recorder) {
+        lock(&self.0.recorders).push(recorder);
+    }
+
+    /// Submits one command buffer with a fence.
+    pub(crate) fn submit_raw(&self, commands: vk::CommandBuffer, fence: vk::Fence) -> Result<(), vk::Result> {
+        let commands = [vk::CommandBufferSubmitInfo::default().command_buffer(commands)];
+        let submit = [vk::SubmitInfo2::default().command_buffer_infos(&commands)];
+        let queue = lock(&self.0.queue);
+        // SAFETY: the queue is locked; the command buffer has ended and its resources are held until the fence is signalled.
+        unsafe { self.0.raw.queue_submit2(*queue, &submit, fence) }
+    }
+
+    /// Runs `use_allocator` with the allocator locked.
+    pub(crate) fn with_allocator<T>(&self, use_allocator: impl FnOnce(&mut Allocator) -> T) -> T {
+        let mut allocator = lock(&self.0.allocator);
+        use_allocator(allocator.as_mut().expect("the allocator lives as long as a Device does"))
+    }
+
+    /// Gives `handle` its name in captures and messages.
+    pub(crate) fn set_name<H: vk::Handle>(&self, handle: H, name: &str) {
+        let Some(debug) = &self.0.debug else { return };
+        let name = c_name(name);
+        let info = vk::DebugUtilsObjectNameInfoEXT::default().object_handle(handle).object_name(&name);
+        // SAFETY: the handle is one of this device's live objects. A name that cannot be set harms nothing.
+        let _ = unsafe { debug.set_debug_utils_object_name(&info) };
+    }
+
+    /// The layout of a descriptor set with these slots, made once.
+    pub(crate) fn set_layout(
+        &self,
+        slots: &[SlotLayout],
+        push: bool,
+    ) -> Result<vk::DescriptorSetLayout, GpuError> {
+        self.0.set_layouts.get(&self.0.raw, slots, push)
+    }
+}
+
+/// Turns the result of `call` into an error; a lost device names `pass`.
+pub(crate) fn lost(call: &'static str, pass: &str) -> impl FnOnce(vk::Result) -> GpuError {
+    let pass = pass.to_owned();
+    move |result| match result {
+        vk::Result::ERROR_DEVICE_LOST => GpuError::DeviceLost { pass },
+        result => GpuError::Vulkan { call, result },
+    }
+}
+
+/// A C string of `name` without inner zeros.
+pub(crate) fn c_name(name: &str) -> CString {
+    let bytes: Vec<u8> = name.bytes().filter(|&b| b != 0).collect();
+    CString::new(bytes).unwrap_or_default()
+}
+
+impl Drop for DeviceInner {
+    fn drop(&mut self) {
+        // SAFETY: every resource holds the device, so none but the device's own objects are left, and no thread can
+        // still be using them. Waiting may fail on a lost device; destroying is right all the same.
+        unsafe {
+            let _ = self.raw.device_wait_idle();
+            let mut allocator = lock(&self.allocator).take();
+            for recorder in lock(&self.recorders).drain(..) {
+                recorder.destroy(&self.raw, allocator.as_mut());
+            }
+            // A cache that cannot be written costs time at the next start, no more; `save_pipeline_cache` reports.
+            let _ = self.pipelines.save(&self.raw, &self.info);
+            self.pipelines.destroy(&self.raw);
+            self.set_layouts.destroy(&self.raw);
+            self.samplers.destroy(&self.raw);
+            drop(allocator);
+            self.raw.destroy_device(None);
+        }
+    }
+}
+
+/// Picks by index, by part of the name, or the most able.
+fn choose(
+    mut devices: Vec<(vk::PhysicalDevice, Detected)>,
+    select: Option<&str>,
+) -> Result<(vk::PhysicalDevice, Detected), GpuError> {
+    let index = match select {
+        None => (0..devices.len()).min_by_key(|&i| {
+            let detected = &devices[i].1;
+            (!detected.missing.is_empty(), kind_rank(detected.info.kind), i)
+        }),
+        Some(text) => match text.trim().parse::<usize>() {
+            Ok(index) => (index < devices.len()).then_some(index),
+            Err(_) => {
+                let wanted = text.trim().to_lowercase();
+                devices.iter().position(|(_, d)| d.info.name.to_lowercase().contains(&wanted))
+            }
+        },
+    };
+    match index {
+        Some(index) => Ok(devices.swap_remove(index)),
+        None => Err(GpuError::NoDevice {
+            wanted: select.map_or("any device".to_owned(), |s| format!("`{s}`")),
+            found: if devices.is_empty() {
+                "none".to_owned()
+            } else {
+                let names: Vec<String> =
+                    devices.iter().map(|(_, d)| format!("{} `{}`", d.info.index, d.info.name)).collect();
+                names.join(", ")
+            },
+        }),
+    }
+}
+
+fn kind_rank(kind: &str) -> usize {
+    ["discrete", "integrated", "virtual", "cpu"].iter().position(|&k| k == kind).unwrap_or(4)
+}
+
+fn create_device(
+    instance: &Instance,
+    physical: vk::PhysicalDevice,
+    detected: &Detected,
+) -> Result<ash::Device, GpuError> {
+    let enable = &detected.enable;
+    let (mut v11, mut v12, mut v13) = (enable.v11, enable.v12, enable.v13);
+    let (mut shading_rate, mut barycentric) = (enable.shading_rate, enable.barycentric);
+    let (mut mesh, mut interlock) = (enable.mesh, enable.interlock);
+    let extensions: Vec<_> = enable.extensions.iter().map(|e| e.as_ptr()).collect();
+    let has = |name: &std::ffi::CStr| enable.extensions.contains(&name);
+    let priorities = [1.0];
+    let queues = [vk::DeviceQueueCreateInfo::default()
+        .queue_family_index(detected.queue_family)
+        .queue_priorities(&priorities)];
+    let mut features = vk::PhysicalDeviceFeatures2::default()
+        .features(enable.core)
+        .push_next(&mut v11)
+        .push_next(&mut v12)
+        .push_next(&mut v13);
+    if has(khr::fragment_shading_rate::NAME) {
+        features = features.push_next(&mut shading_rate);
+    }
+    if has(khr::fragment_shader_barycentric::NAME) {
+        features = features.push_next(&mut barycentric);
+    }
+    if has(ext::mesh_shader::NAME) {
+        features = features.push_next(&mut mesh);
+    }
+    if has(ext::fragment_shader_interlock::NAME) {
+        features = features.push_next(&mut interlock);
+    }
+    let create = vk::DeviceCreateInfo::default()
+        .queue_create_infos(&queues)
+        .enabled_extension_names(&extensions)
+        .push_next(&mut features);
+    // SAFETY: all that `create` points to lives until the call returns; only features and extensions that the device
+    // listed are enabled.
+    unsafe { instance.raw.create_device(physical, &create, None) }.map_err(GpuError::call("vkCreateDevice"))
+}
+
+/// The folder's cache file for this device: `pipelines-UUID.bin`.
+pub(crate) fn cache_file(info: &DeviceInfo, dir: &std::path::Path) -> PathBuf {
+    dir.join(cache::file_name(&info.pipeline_cache_uuid))
+}
