@@ -16,18 +16,16 @@ pub struct SlotLayout {
     pub kind: vk::DescriptorType,
     /// Elements of the array; 1 where it is none.
     pub count: u32,
-    /// Stages that use it. Sets match only where these are equal too: long-lived sets take
-    /// `ALL_GRAPHICS | COMPUTE`, which every pipeline then repeats.
+    /// Stages that use it. A pipeline takes a long-lived set only with equal slots, stages included: it is given
+    /// [`DescriptorSet::slots`].
     pub stages: vk::ShaderStageFlags,
 }
 
 /// The bindings of a long-lived set.
-#[derive(Clone, Copy, Debug)]
-pub struct SetLayoutDesc<'a> {
-    /// Name in errors and captures.
-    pub name: &'a str,
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
+pub struct SetLayoutDesc {
     /// Its bindings.
-    pub slots: &'a [SlotLayout],
+    pub slots: Vec<SlotLayout>,
 }
 
 /// What is bound to one element of a slot.
@@ -67,6 +65,8 @@ pub enum SlotResource {
         /// The layout that the image is in when it is read.
         layout: vk::ImageLayout,
     },
+    /// An image with its sampler (`sampler2D`), in the layout `SHADER_READ_ONLY_OPTIMAL` when it is read.
+    Combined(ImageView, Sampler),
     /// An image that is written or read texel by texel, in the layout `GENERAL`.
     StorageImage {
         /// The view: one level.
@@ -153,13 +153,14 @@ impl Device {
     /// As [`Device::push_set`]; [`GpuError::Shader`] where an element is not written or has the wrong kind.
     pub fn create_texture_set(
         &self,
-        desc: &SetLayoutDesc<'_>,
+        name: &str,
+        desc: &SetLayoutDesc,
         writes: &[SlotWrite],
     ) -> Result<DescriptorSet, GpuError> {
-        check_complete(desc, writes)?;
-        let layout = self.set_layout(desc.slots, false)?;
+        check_complete(name, &desc.slots, writes)?;
+        let layout = self.set_layout(&desc.slots, false)?;
         let mut sizes: HashMap<vk::DescriptorType, u32> = HashMap::new();
-        for slot in desc.slots {
+        for slot in &desc.slots {
             *sizes.entry(slot.kind).or_default() += slot.count;
         }
         let sizes: Vec<_> = sizes
@@ -181,12 +182,12 @@ impl Device {
                 // SAFETY: the writes point into `infos`, alive here; the set is not yet in use.
                 unsafe { self.0.raw.update_descriptor_sets(&writes_raw, &[]) };
                 drop(infos);
-                self.set_name(raw, desc.name);
+                self.set_name(raw, name);
                 Ok(DescriptorSet(Arc::new(DescriptorSetInner {
                     device: self.clone(),
                     pool,
                     raw,
-                    slots: desc.slots.into(),
+                    slots: desc.slots.as_slice().into(),
                     _keep: writes.to_vec(),
                 })))
             }
@@ -224,6 +225,12 @@ impl Device {
                         .sampler(sampler.raw)
                         .image_layout(*layout);
                 }
+                SlotResource::Combined(view, sampler) => {
+                    images[i] = vk::DescriptorImageInfo::default()
+                        .image_view(view.raw)
+                        .sampler(sampler.raw)
+                        .image_layout(vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL);
+                }
                 SlotResource::StorageImage { view } => {
                     images[i] = vk::DescriptorImageInfo::default()
                         .image_view(view.raw)
@@ -259,7 +266,9 @@ impl SlotResource {
             SlotResource::UniformBuffer { .. } => vk::DescriptorType::UNIFORM_BUFFER,
             SlotResource::StorageBuffer { .. } => vk::DescriptorType::STORAGE_BUFFER,
             SlotResource::SampledImage { .. } => vk::DescriptorType::SAMPLED_IMAGE,
-            SlotResource::CombinedImageSampler { .. } => vk::DescriptorType::COMBINED_IMAGE_SAMPLER,
+            SlotResource::CombinedImageSampler { .. } | SlotResource::Combined(..) => {
+                vk::DescriptorType::COMBINED_IMAGE_SAMPLER
+            }
             SlotResource::StorageImage { .. } => vk::DescriptorType::STORAGE_IMAGE,
             SlotResource::Sampler { .. } => vk::DescriptorType::SAMPLER,
         }
@@ -284,8 +293,8 @@ fn buffer_info(
     Ok(if bytes == 0 { info.offset(0).range(vk::WHOLE_SIZE) } else { info.range(bytes) })
 }
 
-fn check_complete(desc: &SetLayoutDesc<'_>, writes: &[SlotWrite]) -> Result<(), GpuError> {
-    for slot in desc.slots {
+fn check_complete(name: &str, slots: &[SlotLayout], writes: &[SlotWrite]) -> Result<(), GpuError> {
+    for slot in slots {
         for element in 0..slot.count {
             let written: Vec<_> =
                 writes.iter().filter(|w| w.binding == slot.binding && w.element == element).collect();
@@ -296,16 +305,15 @@ fn check_complete(desc: &SetLayoutDesc<'_>, writes: &[SlotWrite]) -> Result<(), 
                 _ => "is written twice".to_owned(),
             };
             return Err(GpuError::Shader {
-                name: desc.name.to_owned(),
+                name: name.to_owned(),
                 reason: format!("binding {} element {element} {fault}", slot.binding),
             });
         }
     }
-    let stray =
-        writes.iter().find(|w| !desc.slots.iter().any(|s| s.binding == w.binding && w.element < s.count));
+    let stray = writes.iter().find(|w| !slots.iter().any(|s| s.binding == w.binding && w.element < s.count));
     match stray {
         Some(w) => Err(GpuError::Shader {
-            name: desc.name.to_owned(),
+            name: name.to_owned(),
             reason: format!("binding {} element {} is written, the layout has none", w.binding, w.element),
         }),
         None => Ok(()),

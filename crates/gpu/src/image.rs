@@ -44,12 +44,24 @@ pub enum ViewKind {
 pub struct ViewDesc {
     /// How it presents the image.
     pub kind: ViewKind,
-    /// Mip levels.
+    /// Mip levels; an end of `u32::MAX` is the last level.
     pub mips: Range<u32>,
-    /// Array layers.
+    /// Array layers; an end of `u32::MAX` is the last layer.
     pub layers: Range<u32>,
-    /// Aspects; a view that is sampled has one alone.
+    /// Aspects; none means all that the format has. A view that is sampled has one alone.
     pub aspect: vk::ImageAspectFlags,
+}
+
+impl Default for ViewDesc {
+    /// All levels, layers and aspects, as a plain 2D image.
+    fn default() -> Self {
+        ViewDesc {
+            kind: ViewKind::D2,
+            mips: 0..u32::MAX,
+            layers: 0..u32::MAX,
+            aspect: vk::ImageAspectFlags::empty(),
+        }
+    }
 }
 
 /// An image. Cloning shares it; it is freed after the last clone and the last command that uses it.
@@ -175,25 +187,33 @@ impl Image {
     /// A driver that has no more views.
     ///
     /// # Panics
-    /// If the range is empty or beyond the image.
+    /// If the range is empty or beyond the image, or has several layers in a plain 2D view.
     pub fn view(&self, desc: &ViewDesc) -> Result<ImageView, GpuError> {
+        let end = |end: u32, last: u32| if end == u32::MAX { last } else { end };
+        let desc = ViewDesc {
+            kind: desc.kind,
+            mips: desc.mips.start..end(desc.mips.end, self.0.mips),
+            layers: desc.layers.start..end(desc.layers.end, self.0.layers),
+            aspect: if desc.aspect.is_empty() { self.aspect() } else { desc.aspect },
+        };
         assert!(
             !desc.mips.is_empty()
                 && !desc.layers.is_empty()
                 && desc.mips.end <= self.0.mips
-                && desc.layers.end <= self.0.layers,
+                && desc.layers.end <= self.0.layers
+                && (desc.kind == ViewKind::D2Array || desc.layers.len() == 1),
             "view {desc:?} of {self:?}"
         );
         let mut views = lock(&self.0.views);
-        let raw = match views.get(desc) {
+        let raw = match views.get(&desc) {
             Some(&raw) => raw,
             None => {
-                let raw = self.create_view(desc)?;
+                let raw = self.create_view(&desc)?;
                 views.insert(desc.clone(), raw);
                 raw
             }
         };
-        Ok(ImageView { raw, image: self.clone(), desc: desc.clone() })
+        Ok(ImageView { raw, image: self.clone(), desc })
     }
 
     /// The view of the whole image: an array where it has more than one layer, with all aspects.
@@ -201,12 +221,8 @@ impl Image {
     /// # Errors
     /// As [`Image::view`].
     pub fn full_view(&self) -> Result<ImageView, GpuError> {
-        self.view(&ViewDesc {
-            kind: if self.0.layers > 1 { ViewKind::D2Array } else { ViewKind::D2 },
-            mips: 0..self.0.mips,
-            layers: 0..self.0.layers,
-            aspect: self.aspect(),
-        })
+        let kind = if self.0.layers > 1 { ViewKind::D2Array } else { ViewKind::D2 };
+        self.view(&ViewDesc { kind, ..ViewDesc::default() })
     }
 
     fn create_view(&self, desc: &ViewDesc) -> Result<vk::ImageView, GpuError> {
