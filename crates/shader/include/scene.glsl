@@ -43,16 +43,21 @@ struct MaterialData {
 const uint MATERIAL_UNLIT = 1u;
 const uint MATERIAL_DOUBLE_SIDED = 2u;
 
+// A degenerate transform may leave no direction: zero then, not NaN.
+vec3 unit_or_zero(vec3 v) {
+    return v * inversesqrt(max(dot(v, v), 1e-30));
+}
+
 // Normal matrix times n: the cofactor matrix, turned where the draw is mirrored, so that an outward normal stays one.
 vec3 normal_to_world(vec4 r0, vec4 r1, vec4 r2, bool mirrored, vec3 n) {
     vec3 world = vec3(dot(cross(r1.xyz, r2.xyz), n), dot(cross(r2.xyz, r0.xyz), n), dot(cross(r0.xyz, r1.xyz), n));
-    return normalize(mirrored ? -world : world);
+    return unit_or_zero(mirrored ? -world : world);
 }
 
 // Tangent in world space and the bitangent's sign there; mirroring turns the sign.
 vec4 tangent_to_world(vec4 r0, vec4 r1, vec4 r2, bool mirrored, vec4 t) {
     vec3 world = vec3(dot(r0.xyz, t.xyz), dot(r1.xyz, t.xyz), dot(r2.xyz, t.xyz));
-    return vec4(normalize(world), mirrored ? -t.w : t.w);
+    return vec4(unit_or_zero(world), mirrored ? -t.w : t.w);
 }
 
 // An affine transform given by its rows.

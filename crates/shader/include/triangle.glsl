@@ -67,8 +67,8 @@ TextureCoordinates interpolate_uv(Barycentrics b, vec2 uv0, vec2 uv1, vec2 uv2) 
     return TextureCoordinates(uv * b.at, uv * b.ddx, uv * b.ddy);
 }
 
-vec2 load_uv(uint attribute, uint offset) {
-    return uintBitsToFloat(uvec2(attributes[attribute + offset], attributes[attribute + offset + 1u]));
+vec2 load_uv(uint first, uint offset) {
+    return uintBitsToFloat(uvec2(attributes[first + offset], attributes[first + offset + 1u]));
 }
 
 SurfacePoint triangle_point(uint id, vec2 ndc, out uint material) {

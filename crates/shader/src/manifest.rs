@@ -91,7 +91,7 @@ pub fn parse(prefix: &str, folder: &Path, text: &str) -> Result<Vec<Variant>, Ma
                 "found file `{file}`, expected one that ends in .vert, .tesc, .tese, .geom, .frag or .comp"
             ))
         })?;
-        let mut name = format!("{prefix}/{file}");
+        let mut name = format!("{prefix}/{}", file.strip_suffix(".glsl").unwrap_or(file));
         let mut defines = Vec::new();
         for word in words {
             if let Some(tag) = word.strip_prefix('#') {

@@ -1,0 +1,220 @@
+//! The cost model of Petrescu et al. 2016, section 3 and 4: pure arithmetic over counted symbols.
+
+use serde::Serialize;
+
+/// The model's symbols for a scene, a view and a device. Traffic and memory are in floats of four bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Workload {
+    /// o: draws.
+    pub objects: f64,
+    /// l: lights.
+    pub lights: f64,
+    /// o_cmd: cost of one object draw.
+    pub object_command: f64,
+    /// l_cmd: cost of one light draw.
+    pub light_command: f64,
+    /// tile_cmd: cost of one tile's dispatch.
+    pub tile_command: f64,
+    /// ov: vertices of all objects.
+    pub object_vertices: f64,
+    /// lv: vertices of all light volumes.
+    pub light_vertices: f64,
+    /// ov_proc: processing of an object vertex.
+    pub object_vertex_processing: f64,
+    /// lv_proc: processing of a light vertex.
+    pub light_vertex_processing: f64,
+    /// ov_band: floats of an object vertex.
+    pub object_vertex_traffic: f64,
+    /// lv_band: floats of a light vertex.
+    pub light_vertex_traffic: f64,
+    /// of: fragments of objects.
+    pub object_fragments: f64,
+    /// lf: pairs of a light and a pixel.
+    pub light_fragments: f64,
+    /// of_band: floats of an object fragment (textures, interpolants).
+    pub object_fragment_traffic: f64,
+    /// lf_band: floats of a light as a fragment reads it.
+    pub light_fragment_traffic: f64,
+    /// eq_proc: one evaluation of the illumination model.
+    pub evaluation: f64,
+    /// p: pixels.
+    pub pixels: f64,
+    /// t: tiles of the image.
+    pub tiles: f64,
+    /// t in lf/t: pixels that share one list of lights.
+    pub pixels_a_tile: f64,
+    /// sspp: shading samples a pixel.
+    pub shading_samples: f64,
+    /// memll: floats of light lists.
+    pub light_list_floats: f64,
+    /// lcp: share of light-pixel pairs that culling removes.
+    pub light_culling: f64,
+    /// sort_cost.
+    pub sort: f64,
+}
+
+impl Default for Workload {
+    /// Zero counts; unit costs, the traffic of this project's vertex (10 floats), light (16) and surface (18: interpolants
+    /// and three texture samples), one shading sample.
+    fn default() -> Self {
+        Self {
+            objects: 0.0,
+            lights: 0.0,
+            object_command: 1.0,
+            light_command: 1.0,
+            tile_command: 1.0,
+            object_vertices: 0.0,
+            light_vertices: 0.0,
+            object_vertex_processing: 1.0,
+            light_vertex_processing: 1.0,
+            object_vertex_traffic: 10.0,
+            light_vertex_traffic: 3.0,
+            object_fragments: 0.0,
+            light_fragments: 0.0,
+            object_fragment_traffic: 18.0,
+            light_fragment_traffic: 16.0,
+            evaluation: 1.0,
+            pixels: 0.0,
+            tiles: 0.0,
+            pixels_a_tile: 256.0,
+            shading_samples: 1.0,
+            light_list_floats: 0.0,
+            light_culling: 0.0,
+            sort: 0.0,
+        }
+    }
+}
+
+/// The four costs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Cost {
+    /// K_cmd: GPU commands.
+    pub cmd: f64,
+    /// K_proc: processing.
+    pub proc: f64,
+    /// K_mem: allocated memory, floats.
+    pub mem: f64,
+    /// K_band: floats read or written.
+    pub band: f64,
+}
+
+impl Workload {
+    fn vertices(&self) -> f64 {
+        self.object_vertices * self.object_vertex_processing
+    }
+    fn light_volumes(&self) -> f64 {
+        self.light_vertices * self.light_vertex_processing
+    }
+    fn vertex_traffic(&self) -> f64 {
+        self.object_vertices * self.object_vertex_traffic
+    }
+    fn volume_traffic(&self) -> f64 {
+        self.light_vertices * self.light_vertex_traffic
+    }
+}
+
+/// F, section 4.1: `pass` = lights that one draw applies: all (a loop in the shader: one draw an object) or one.
+pub fn forward(w: &Workload, draws_per_object: f64) -> Cost {
+    Cost {
+        cmd: w.objects * draws_per_object * w.object_command,
+        proc: w.vertices() + w.object_fragments * w.lights * w.evaluation,
+        mem: 0.0,
+        band: w.vertex_traffic() + w.object_fragments * (w.object_fragment_traffic + 2.0),
+    }
+}
+
+/// DPP, section 4.2, the second pass a loop over the lights.
+pub fn depth_prepass(w: &Workload) -> Cost {
+    Cost {
+        cmd: 2.0 * w.objects * w.object_command,
+        proc: w.vertices() + (w.vertices() + w.pixels * w.lights * w.evaluation),
+        mem: 0.0,
+        band: (w.vertex_traffic() + w.object_fragments)
+            + (w.vertex_traffic() + w.pixels * (w.object_fragment_traffic + 2.0)),
+    }
+}
+
+/// D, section 4.3.
+pub fn deferred(w: &Workload) -> Cost {
+    Cost {
+        cmd: w.objects * w.object_command + w.lights * w.light_command,
+        proc: w.vertices() + (w.light_volumes() + w.light_fragments * w.evaluation),
+        mem: 4.0 * w.pixels,
+        band: (w.vertex_traffic() + w.object_fragments * (w.object_fragment_traffic + 3.0))
+            + (w.volume_traffic() + w.light_fragments * (w.light_fragment_traffic + 3.0))
+            + 3.0 * w.pixels,
+    }
+}
+
+/// TD, section 4.8.
+pub fn tiled_deferred(w: &Workload) -> Cost {
+    let shared = w.light_fragments / w.pixels_a_tile;
+    Cost {
+        cmd: w.objects * w.object_command + w.lights * w.light_command,
+        proc: w.vertices() + w.light_volumes() + w.light_fragments * w.evaluation,
+        mem: 3.0 * w.pixels + w.light_list_floats,
+        band: (w.vertex_traffic() + w.object_fragments * (w.object_fragment_traffic + 3.0))
+            + (w.volume_traffic() + shared)
+            + (shared * w.light_fragment_traffic + 4.0 * w.pixels),
+    }
+}
+
+/// D++, section 4.11. The paper numbers two terms 3; the second is pass 4.
+pub fn visibility_buffer(w: &Workload) -> Cost {
+    let shared = w.light_fragments / w.pixels_a_tile * (1.0 - w.light_culling);
+    let vertices_a_tile = if w.tiles > 0.0 { w.object_vertices / w.tiles } else { 0.0 };
+    Cost {
+        cmd: w.objects * w.object_command + w.lights * w.light_command + w.tiles * w.tile_command,
+        proc: w.vertices()
+            + w.sort
+            + w.light_volumes()
+            + (vertices_a_tile * w.object_vertex_processing
+                + w.light_fragments * (1.0 - w.light_culling) * w.evaluation),
+        mem: 3.0 * w.pixels + w.light_list_floats,
+        band: (w.vertex_traffic() + 2.0 * w.object_fragments)
+            + 2.0 * w.tiles
+            + (w.volume_traffic() + shared)
+            + (vertices_a_tile * w.object_vertex_traffic
+                + w.pixels * w.object_fragment_traffic
+                + w.light_fragment_traffic * shared
+                + w.pixels),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn workload() -> Workload {
+        Workload {
+            objects: 10.0,
+            lights: 3.0,
+            object_vertices: 100.0,
+            object_fragments: 50.0,
+            light_fragments: 20.0,
+            light_vertices: 24.0,
+            pixels: 40.0,
+            tiles: 2.0,
+            pixels_a_tile: 20.0,
+            object_vertex_traffic: 2.0,
+            light_vertex_traffic: 1.0,
+            object_fragment_traffic: 5.0,
+            light_fragment_traffic: 7.0,
+            ..Workload::default()
+        }
+    }
+
+    /// Worked by hand from the paper's formulas.
+    #[test]
+    fn formulas_give_the_papers_terms() {
+        let w = workload();
+        assert_eq!(forward(&w, 3.0), Cost { cmd: 30.0, proc: 250.0, mem: 0.0, band: 550.0 });
+        assert_eq!(depth_prepass(&w), Cost { cmd: 20.0, proc: 320.0, mem: 0.0, band: 730.0 });
+        assert_eq!(deferred(&w), Cost { cmd: 13.0, proc: 144.0, mem: 160.0, band: 600.0 + 224.0 + 120.0 });
+        assert_eq!(tiled_deferred(&w), Cost { cmd: 13.0, proc: 144.0, mem: 120.0, band: 600.0 + 25.0 + 167.0 });
+        assert_eq!(
+            visibility_buffer(&w),
+            Cost { cmd: 15.0, proc: 100.0 + 24.0 + 70.0, mem: 120.0, band: 300.0 + 4.0 + 25.0 + 347.0 }
+        );
+    }
+}

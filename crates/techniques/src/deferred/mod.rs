@@ -1,0 +1,72 @@
+//! `deferred`: a G-buffer, then one volume a light that adds to the accumulation.
+
+// ORDER: 40
+
+use afterlight_graph::{Blend, Graph, ImageHandle, Load, gpu::vk};
+
+use crate::{
+    Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError,
+    cost::{self, Cost, Workload},
+    gbuffer, volumes,
+};
+
+/// The technique.
+pub static TECHNIQUE: Deferred = Deferred;
+
+/// See the module.
+pub struct Deferred;
+
+static INFO: Info = Info {
+    id: "deferred",
+    title: "Deferred shading",
+    summary: "Surfaces fill a G-buffer; each light's volume is drawn over it and adds what the light gives.",
+    sources: &[Source { key: "petrescu-2016", section: "4.3" }],
+    answers: Answers {
+        surface: "G-buffer, 1 sample",
+        lights: "light volumes",
+        schedule: "fragment shader",
+        resolve: "one sample",
+    },
+    appendix_a: AppendixA {
+        id: "D",
+        intersect: "imp",
+        transparency: "n",
+        hardware_msaa: "n",
+        light_access: "seq",
+        material_access: "rand",
+        rates_decoupled: "n, n",
+    },
+    exactness: Exactness::Exact { min_psnr_db: 50.0 },
+    params: &[],
+    needs: &[],
+    samples: &[1],
+};
+
+impl Technique for Deferred {
+    fn info(&self) -> &Info {
+        &INFO
+    }
+
+    fn predict(&self, workload: &Workload, _: &Params) -> Cost {
+        cost::deferred(workload)
+    }
+
+    fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
+        let mut filled = gbuffer::fill(graph, frame, "deferred", vk::Format::D32_SFLOAT)?;
+        let volume = volumes::volume_state(frame, Some("volumes/light.frag"), vk::CullModeFlags::FRONT, Blend::ADD)?
+            .depth(volumes::BEHIND_SURFACE);
+        let bounded = frame.lights.count - frame.lights.unbounded_count;
+
+        let mut pass = graph.raster("deferred/lights");
+        frame.bind_scene(&mut pass);
+        gbuffer::bind(&mut pass, &filled);
+        filled.accumulation = pass.color(filled.accumulation, Load::Keep);
+        pass.depth_read_only(&filled.depth);
+        volumes::draw_unbounded(frame, &mut pass, "volumes/light.frag")?;
+        if bounded > 0 {
+            pass.draw(volumes::volume_draw(frame, volume, frame.lights.unbounded_count, bounded));
+        }
+        pass.finish();
+        Ok(filled.accumulation)
+    }
+}

@@ -1,0 +1,89 @@
+//! `depth-prepass`: depth first, then forward shading of what is visible alone.
+
+// ORDER: 30
+
+use afterlight_graph::{DepthTest, Graph, ImageHandle, Load, StencilFace, StencilTest, gpu::vk};
+
+use crate::{
+    Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError,
+    cost::{Cost, Workload, depth_prepass},
+    geometry::Surfaces,
+};
+
+/// The technique.
+pub static TECHNIQUE: DepthPrepass = DepthPrepass;
+
+/// See the module.
+pub struct DepthPrepass;
+
+static INFO: Info = Info {
+    id: "depth-prepass",
+    title: "Depth pre-pass",
+    summary: "A pass for depth alone, then forward shading where the depth is equal: each pixel is shaded once.",
+    sources: &[Source { key: "petrescu-2016", section: "4.2" }],
+    answers: Answers {
+        surface: "nothing (depth)",
+        lights: "loop over all",
+        schedule: "fragment shader",
+        resolve: "one sample",
+    },
+    appendix_a: AppendixA {
+        id: "DPP",
+        intersect: "imp",
+        transparency: "n",
+        hardware_msaa: "y",
+        light_access: "rand",
+        material_access: "rand",
+        rates_decoupled: "n, n",
+    },
+    exactness: Exactness::Exact { min_psnr_db: 50.0 },
+    params: &[],
+    needs: &[],
+    samples: &[1],
+};
+
+/// Lets the first fragment of a pixel pass and no other: where two surfaces have one depth, the first drawn wins, as in a
+/// pass with a `GREATER` depth test.
+pub(crate) const FIRST_FRAGMENT: StencilTest = {
+    let face = StencilFace {
+        compare: vk::CompareOp::NOT_EQUAL,
+        fail: vk::StencilOp::KEEP,
+        depth_fail: vk::StencilOp::KEEP,
+        pass: vk::StencilOp::REPLACE,
+    };
+    StencilTest { front: face, back: face, compare_mask: 0xff, write_mask: 0xff }
+};
+
+impl Technique for DepthPrepass {
+    fn info(&self) -> &Info {
+        &INFO
+    }
+
+    fn predict(&self, workload: &Workload, _: &Params) -> Cost {
+        depth_prepass(workload)
+    }
+
+    fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
+        let radiance = graph.image("depth-prepass/radiance", frame.image_info(vk::Format::R16G16B16A16_SFLOAT));
+        let depth = graph.image("depth-prepass/depth", frame.image_info(vk::Format::D32_SFLOAT_S8_UINT));
+        let depth_only = Surfaces::depth_only(frame)?;
+        let shaded = Surfaces::shaded(frame, "forward/forward.frag", "forward/forward.frag#mask")?
+            .depth(DepthTest::EQUAL)
+            .stencil(FIRST_FRAGMENT, 1);
+
+        let mut pass = graph.raster("depth-prepass/depth");
+        frame.bind_scene(&mut pass);
+        let depth = pass.depth(depth, Load::Clear(0.0));
+        pass.stencil_clear(0);
+        depth_only.draw(frame, &mut pass);
+        pass.finish();
+
+        let mut pass = graph.raster("depth-prepass/shade");
+        frame.bind_scene(&mut pass);
+        let radiance = pass.color(radiance, Load::Clear(frame.background()));
+        let _depth = pass.stencil(depth, Load::Keep);
+        shaded.draw(frame, &mut pass);
+        pass.finish();
+        Ok(radiance)
+    }
+}

@@ -1,0 +1,160 @@
+//! Which draws a view needs, in which order: frustum culling and sorting on the CPU, written as indirect commands.
+
+use afterlight_graph::gpu::{self, vk};
+use afterlight_scene::Aabb;
+use glam::{Mat4, Vec3, Vec4};
+
+use crate::scene_gpu::{BUCKETS, DrawInfo, SceneGpu};
+
+/// How draws are chosen and ordered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DrawOptions {
+    /// Leaves out draws whose bounds lie outside the view.
+    pub cull: bool,
+    /// Orders the draws of each bucket from near to far, so that early depth tests save shading.
+    pub near_first: bool,
+}
+
+impl Default for DrawOptions {
+    fn default() -> Self {
+        Self { cull: true, near_first: true }
+    }
+}
+
+/// `VkDrawIndexedIndirectCommand`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
+pub(crate) struct DrawCommand {
+    pub index_count: u32,
+    pub instance_count: u32,
+    pub first_index: u32,
+    pub vertex_offset: i32,
+    /// The draw's number: instances are draws.
+    pub first_instance: u32,
+}
+
+/// Distance between commands in the buffer, bytes.
+pub(crate) const COMMAND_BYTES: u64 = size_of::<DrawCommand>() as u64;
+
+/// Indirect commands of a view, one range of the buffer a bucket, and their counts.
+pub(crate) struct DrawList {
+    pub commands: gpu::Buffer,
+    pub counts: gpu::Buffer,
+    pub options: DrawOptions,
+    /// Draws in view, by bucket, in drawing order.
+    pub visible: [Vec<u32>; BUCKETS],
+}
+
+impl DrawList {
+    pub fn new(device: &gpu::Device, scene: &SceneGpu, options: DrawOptions) -> Result<Self, gpu::GpuError> {
+        let buffer = |name, bytes| {
+            device.create_buffer(&gpu::BufferDesc {
+                name,
+                bytes,
+                usage: vk::BufferUsageFlags::INDIRECT_BUFFER,
+                memory: gpu::MemoryKind::Upload,
+            })
+        };
+        Ok(Self {
+            commands: buffer("draw commands", COMMAND_BYTES * scene.draw_infos.len().max(1) as u64)?,
+            counts: buffer("draw counts", 4 * BUCKETS as u64)?,
+            options,
+            visible: Default::default(),
+        })
+    }
+
+    /// Chooses and orders the draws for a view and writes the commands.
+    pub fn update(&mut self, scene: &SceneGpu, clip_from_world: Mat4, eye_ws: Vec3) -> Result<(), gpu::GpuError> {
+        let frustum = Frustum::new(clip_from_world);
+        let mut counts = [0u32; BUCKETS];
+        for (bucket, visible) in self.visible.iter_mut().enumerate() {
+            let (first, end) = (scene.bucket_first[bucket], scene.bucket_first[bucket + 1]);
+            let in_view = |draw: &u32| !self.options.cull || frustum.touches(&scene.draw_infos[*draw as usize].bounds_ws);
+            let mut keyed: Vec<(f32, u32)> = (first..end)
+                .filter(in_view)
+                .map(|draw| (distance_sq(&scene.draw_infos[draw as usize].bounds_ws, eye_ws), draw))
+                .collect();
+            if self.options.near_first {
+                // Draws of one distance keep the scene's order, so that equal depths resolve alike in every technique.
+                keyed.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            }
+            visible.clear();
+            visible.extend(keyed.iter().map(|(_, draw)| *draw));
+            let commands: Vec<DrawCommand> =
+                visible.iter().map(|draw| command(&scene.draw_infos[*draw as usize], *draw)).collect();
+            counts[bucket] = commands.len() as u32;
+            if !commands.is_empty() {
+                self.commands.write(COMMAND_BYTES * u64::from(first), bytemuck::cast_slice(&commands))?;
+            }
+        }
+        self.counts.write(0, bytemuck::cast_slice(&counts))
+    }
+}
+
+pub(crate) fn command(info: &DrawInfo, draw: u32) -> DrawCommand {
+    DrawCommand {
+        index_count: info.index_count,
+        instance_count: 1,
+        first_index: info.first_index,
+        vertex_offset: info.first_vertex as i32,
+        first_instance: draw,
+    }
+}
+
+/// Squared distance from a point to a box, 0 inside.
+pub(crate) fn distance_sq(bounds: &Aabb, point: Vec3) -> f32 {
+    point.clamp(bounds.min.min(bounds.max), bounds.max.max(bounds.min)).distance_squared(point)
+}
+
+/// Half-spaces of a view: inside where dot(xyz, p) + w ≥ 0.
+struct Frustum([Vec4; 6]);
+
+impl Frustum {
+    /// Rows of clip_from_world combined (Gribb and Hartmann 2001); depth is reversed, so near is w − z and far z.
+    fn new(m: Mat4) -> Self {
+        let (x, y, z, w) = (m.row(0), m.row(1), m.row(2), m.row(3));
+        Self([w + x, w - x, w + y, w - y, w - z, z])
+    }
+
+    /// Whether a box may be in view: false only where it lies outside one half-space as a whole. Boxes with a bound
+    /// that is no number are kept.
+    fn touches(&self, bounds: &Aabb) -> bool {
+        !self.0.iter().any(|plane| {
+            let n = plane.truncate();
+            let farthest = Vec3::select(n.cmpge(Vec3::ZERO), bounds.max, bounds.min);
+            n.dot(farthest) + plane.w < 0.0
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use afterlight_scene::Camera;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// A box with a corner in the clip volume is never culled.
+        #[test]
+        fn boxes_in_view_are_kept(c in prop::array::uniform3(-20f32..20.0), s in prop::array::uniform3(0f32..5.0),
+                                  e in prop::array::uniform3(-10f32..10.0)) {
+            let camera = Camera::look_at("c", e.into(), Vec3::new(0.3, 0.2, 0.1), 1.0, 0.1);
+            let clip = camera.clip_from_view(1.5) * camera.view_from_world();
+            let bounds = Aabb { min: Vec3::from(c) - Vec3::from(s), max: Vec3::from(c) + Vec3::from(s) };
+            let seen = (0..8).any(|i| {
+                let p = Vec3::select(glam::BVec3::new(i & 1 == 1, i & 2 == 2, i & 4 == 4), bounds.max, bounds.min);
+                let q = clip * p.extend(1.0);
+                q.x.abs() <= q.w && q.y.abs() <= q.w && q.z >= 0.0 && q.z <= q.w
+            });
+            prop_assert!(!seen || Frustum::new(clip).touches(&bounds));
+        }
+    }
+
+    #[test]
+    fn a_box_behind_the_eye_is_culled() {
+        let camera = Camera::look_at("c", Vec3::ZERO, Vec3::NEG_Z, 1.0, 0.1);
+        let clip = camera.clip_from_view(1.0) * camera.view_from_world();
+        let bounds = Aabb { min: Vec3::new(-1.0, -1.0, 2.0), max: Vec3::new(1.0, 1.0, 3.0) };
+        assert!(!Frustum::new(clip).touches(&bounds));
+    }
+}

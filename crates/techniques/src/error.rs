@@ -1,0 +1,72 @@
+//! What can go wrong between a scene and its image.
+
+use afterlight_graph::{GraphError, gpu::GpuError};
+use afterlight_scene::SceneError;
+
+/// An error of preparing or running a technique: one line that names what, found and expected.
+#[derive(Debug, thiserror::Error)]
+pub enum TechniqueError {
+    /// An image or buffer of the scene.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// The device.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+    /// The frame graph.
+    #[error(transparent)]
+    Graph(#[from] GraphError),
+    /// A shader name that the program does not have.
+    #[error("shader {name:?}: not compiled into this program; expected one of the names in variants.txt")]
+    UnknownShader {
+        /// The name.
+        name: String,
+    },
+    /// A parameter that no technique has.
+    #[error("parameter {key:?} of {technique}: found no such parameter, expected one of: {known}")]
+    UnknownParam {
+        /// The parameter.
+        key: String,
+        /// The technique.
+        technique: &'static str,
+        /// What it has.
+        known: String,
+    },
+    /// A parameter's value out of range.
+    #[error("parameter {key}: found {found:?}, expected {expected}")]
+    BadParam {
+        /// The parameter.
+        key: String,
+        /// The value.
+        found: String,
+        /// The range.
+        expected: String,
+    },
+    /// Something larger than the device takes.
+    #[error("{what}: found {found}, expected at most {limit}")]
+    TooLarge {
+        /// What.
+        what: String,
+        /// Found.
+        found: u64,
+        /// Limit.
+        limit: u64,
+    },
+    /// A sample count that technique or device lack.
+    #[error("samples for {technique}: found {found}, expected one of: {expected}")]
+    Samples {
+        /// The technique.
+        technique: &'static str,
+        /// The count asked for.
+        found: u32,
+        /// Counts that it can render here.
+        expected: String,
+    },
+    /// The device lacks features.
+    #[error("{technique}: the device lacks {missing}")]
+    Unavailable {
+        /// The technique.
+        technique: &'static str,
+        /// The features.
+        missing: String,
+    },
+}

@@ -1,0 +1,23 @@
+// Forward shading: every fragment visits every light (Petrescu et al. 2016, section 4.1).
+// Out: linear radiance, RGBA16F.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "shading.glsl"
+#include "surface_in.glsl"
+
+layout(location = 0) out vec4 radiance_out;
+
+void main() {
+    MaterialData m = materials[draw_material.y];
+    SurfacePoint p = surface_point();
+    vec4 base = visible_base_color(m, p);
+    Surface s = surface_at(m, p, base.rgb);
+    vec3 radiance = unlit_radiance(s);
+    if (!s.unlit) {
+        ShadingPoint point = shading_point(s);
+        for (uint i = 0u; i < frame.light_count; ++i) {
+            radiance += light_radiance(point, i);
+        }
+    }
+    radiance_out = vec4(radiance, 1.0);
+}

@@ -1,0 +1,149 @@
+//! What a technique is given to record a frame.
+
+use afterlight_graph::{BufferHandle, Graph, ImageHandle, ImageInfo, gpu::vk};
+use afterlight_shader::Shader;
+
+use crate::{
+    SHADERS, error::TechniqueError, light_list::LightList, params::Params, scene_gpu::SceneGpu,
+};
+
+/// A frame to be recorded: the scene on the device, its buffers imported into the graph, sizes and parameters.
+pub struct Frame<'a> {
+    /// Image width, pixels.
+    pub width_px: u32,
+    /// Image height, pixels.
+    pub height_px: u32,
+    /// Visibility samples a pixel.
+    pub samples: u32,
+    /// Parameters of the technique.
+    pub params: &'a Params,
+    /// The scene.
+    pub scene: &'a SceneGpu,
+    /// The lights.
+    pub lights: &'a LightList,
+    /// World to clip. A technique that uses it while recording is recorded again when the camera moves.
+    pub clip_from_world: glam::Mat4,
+    /// Radiance of pixels without a surface.
+    pub background_radiance: [f32; 3],
+    pub(crate) buffers: FrameBuffers,
+    pub(crate) extra_shaders: &'a [Shader],
+}
+
+/// Buffers of the scene and the frame as the graph knows them.
+pub(crate) struct FrameBuffers {
+    pub frame: BufferHandle,
+    pub draws: BufferHandle,
+    pub materials: BufferHandle,
+    pub uv_transforms: BufferHandle,
+    pub lights: BufferHandle,
+    pub light_spheres: BufferHandle,
+    pub positions: BufferHandle,
+    pub attributes: BufferHandle,
+    pub indices: BufferHandle,
+    pub commands: BufferHandle,
+    pub command_counts: BufferHandle,
+    pub volume: BufferHandle,
+    pub volume_indices: BufferHandle,
+}
+
+/// What binds resources to the slots of a pass: raster or compute.
+pub trait Slots {
+    /// Binds a buffer that shaders read.
+    fn read_buffer(&mut self, slot: &str, buffer: &BufferHandle);
+    /// Binds an image that shaders read.
+    fn read_image(&mut self, slot: &str, image: &ImageHandle);
+    /// Binds the scene's textures.
+    fn textures(&mut self, set: &afterlight_graph::gpu::DescriptorSet);
+}
+
+macro_rules! slots {
+    ($pass:ident) => {
+        impl Slots for afterlight_graph::$pass<'_> {
+            fn read_buffer(&mut self, slot: &str, buffer: &BufferHandle) {
+                self.read(slot, buffer);
+            }
+            fn read_image(&mut self, slot: &str, image: &ImageHandle) {
+                self.read(slot, image);
+            }
+            fn textures(&mut self, set: &afterlight_graph::gpu::DescriptorSet) {
+                self.texture_set(set);
+            }
+        }
+    };
+}
+slots!(RasterPass);
+slots!(ComputePass);
+
+impl Frame<'_> {
+    /// A shader of the program by name, `folder/file.stage#tag`.
+    ///
+    /// # Errors
+    /// [`TechniqueError::UnknownShader`].
+    pub fn shader(&self, name: &str) -> Result<Shader, TechniqueError> {
+        self.extra_shaders
+            .iter()
+            .find(|s| s.name == *name)
+            .cloned()
+            .or_else(|| SHADERS.iter().find(|s| s.name == *name).cloned())
+            .ok_or_else(|| TechniqueError::UnknownShader { name: name.to_owned() })
+    }
+
+    /// Describes an image as large as the frame, one sample.
+    pub fn image_info(&self, format: vk::Format) -> ImageInfo {
+        ImageInfo::new(format, self.width_px, self.height_px)
+    }
+
+    /// Binds what every pass over the scene may read, by the names of `include/*.glsl`: frame constants, draws, materials,
+    /// lights, vertices, textures. Slots that no shader of the pass has stay unused.
+    pub fn bind_scene(&self, pass: &mut impl Slots) {
+        let b = &self.buffers;
+        pass.read_buffer("FrameBlock", &b.frame);
+        pass.read_buffer("Draws", &b.draws);
+        pass.read_buffer("Materials", &b.materials);
+        pass.read_buffer("UvTransforms", &b.uv_transforms);
+        pass.read_buffer("Lights", &b.lights);
+        pass.read_buffer("LightSpheres", &b.light_spheres);
+        pass.read_buffer("Positions", &b.positions);
+        pass.read_buffer("Attributes", &b.attributes);
+        pass.read_buffer("Indices", &b.indices);
+        pass.textures(&self.scene.texture_set);
+    }
+
+    /// The scene's specialization constants that the shaders have.
+    pub fn constants(&self, shaders: &[&Shader]) -> Vec<(String, u32)> {
+        self.scene
+            .constants
+            .iter()
+            .copied()
+            .chain([("ONLY_POINT_LIGHTS", u32::from(self.lights.only_points))])
+            .filter(|(name, _)| shaders.iter().any(|s| s.reflection.spec_constant(name).is_some()))
+            .map(|(name, bits)| (name.to_owned(), bits))
+            .collect()
+    }
+
+    /// Declares a compute pass over the scene: buffers, textures and constants bound.
+    pub fn compute<'g>(
+        &self,
+        graph: &'g mut Graph,
+        name: &str,
+        shader: &Shader,
+    ) -> afterlight_graph::ComputePass<'g> {
+        let mut pass = graph.compute(name, shader);
+        self.bind_scene(&mut pass);
+        for (name, bits) in self.constants(&[shader]) {
+            pass.constant(&name, bits);
+        }
+        pass
+    }
+
+    /// Radiance of pixels without a surface as a clear value.
+    pub fn background(&self) -> [f32; 4] {
+        let [r, g, b] = self.background_radiance;
+        [r, g, b, 1.0]
+    }
+
+    /// Groups of `size`×`size` threads that cover the image.
+    pub fn groups(&self, size: u32) -> [u32; 3] {
+        [self.width_px.div_ceil(size), self.height_px.div_ceil(size), 1]
+    }
+}

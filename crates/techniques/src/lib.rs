@@ -1,0 +1,59 @@
+//! The techniques of deferred shading: recipes, stages, shaders, and the renderer that runs them.
+//!
+//! A technique answers four questions (what a surface leaves behind, how lights find it, where shading runs, how samples
+//! become pixels) and is one folder: `mod.rs` with its `TECHNIQUE`, its shaders, `variants.txt` that lists their variants,
+//! a README. The build collects the folders into [`registry`]. Stages that several techniques share stand beside them:
+//! [`geometry`], [`gbuffer`], [`volumes`], [`present`].
+//!
+//! ```no_run
+//! use afterlight_techniques::{Params, Renderer, Settings, find, graph::gpu};
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let device = gpu::Device::open(&gpu::DeviceOptions::default())?;
+//! let scene = afterlight_scene::load_source("builtin:colonnade", &Default::default())?;
+//! let renderer = Renderer::new(&device, &scene, &Settings::for_scene(&scene, 640, 360))?;
+//! let mut frame = renderer.prepare(find("tiled").unwrap(), &Params::default())?;
+//! frame.run()?;
+//! let rgba8_srgb = frame.final_rgba8()?;
+//! # Ok(()) }
+//! ```
+
+pub use afterlight_graph as graph;
+pub use afterlight_scene as scene;
+pub use afterlight_shader as shader;
+
+pub mod cost;
+mod draw_list;
+mod error;
+mod frame;
+pub mod gbuffer;
+pub mod geometry;
+mod light_list;
+mod params;
+pub mod present;
+mod renderer;
+mod scene_gpu;
+mod technique;
+mod textures;
+pub mod volumes;
+
+pub use draw_list::DrawOptions;
+pub use error::TechniqueError;
+pub use frame::Frame;
+pub use light_list::LightList;
+pub use params::{ParamInfo, ParamKind, Params};
+pub use renderer::{Prepared, Renderer, Settings};
+pub use scene_gpu::SceneGpu;
+pub use technique::{Answers, AppendixA, Exactness, Info, Need, Source, Technique};
+
+include!(concat!(env!("OUT_DIR"), "/registry.rs"));
+include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
+
+/// Every technique of this crate.
+pub fn registry() -> &'static [&'static dyn Technique] {
+    TECHNIQUES
+}
+
+/// The technique with that id.
+pub fn find(id: &str) -> Option<&'static dyn Technique> {
+    registry().iter().copied().find(|t| t.info().id == id)
+}

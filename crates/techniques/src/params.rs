@@ -1,0 +1,115 @@
+//! Parameters of techniques: listed data, checked against ranges.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use crate::error::TechniqueError;
+
+/// What values a parameter takes.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case", tag = "kind")]
+pub enum ParamKind {
+    /// One of some words.
+    Choice {
+        /// The words.
+        values: &'static [&'static str],
+    },
+    /// A whole number in a range.
+    Integer {
+        /// Least value.
+        min: u32,
+        /// Greatest value.
+        max: u32,
+    },
+}
+
+/// A parameter of a technique.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ParamInfo {
+    /// Name, as in `--set NAME=VALUE`.
+    pub key: &'static str,
+    /// What it does.
+    pub summary: &'static str,
+    /// Its values.
+    #[serde(flatten)]
+    pub kind: ParamKind,
+    /// The default.
+    pub default: &'static str,
+}
+
+/// Parameters that every technique has.
+pub const COMMON: &[ParamInfo] = &[
+    ParamInfo {
+        key: "cull",
+        summary: "draws outside the view are left out on the CPU",
+        kind: ParamKind::Choice { values: &["frustum", "none"] },
+        default: "frustum",
+    },
+    ParamInfo {
+        key: "order",
+        summary: "order of draws: near to far, or as in the scene",
+        kind: ParamKind::Choice { values: &["near", "scene"] },
+        default: "near",
+    },
+];
+
+impl ParamKind {
+    fn check(&self, key: &str, value: &str) -> Result<(), TechniqueError> {
+        let (ok, expected) = match self {
+            Self::Choice { values } => (values.contains(&value), format!("one of: {}", values.join(", "))),
+            Self::Integer { min, max } => (
+                value.parse::<u32>().is_ok_and(|v| (*min..=*max).contains(&v)),
+                format!("a whole number from {min} to {max}"),
+            ),
+        };
+        if ok {
+            return Ok(());
+        }
+        Err(TechniqueError::BadParam { key: key.to_owned(), found: value.to_owned(), expected })
+    }
+}
+
+/// Values of parameters, by name; what is not set has its default.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(transparent)]
+pub struct Params {
+    values: BTreeMap<String, String>,
+}
+
+impl Params {
+    /// Sets a parameter of a technique.
+    ///
+    /// # Errors
+    /// A name that the technique does not have, a value out of range: both list what is known.
+    pub fn set(&mut self, info: &crate::Info, key: &str, value: &str) -> Result<(), TechniqueError> {
+        let param = Self::known(info).find(|p| p.key == key).ok_or_else(|| TechniqueError::UnknownParam {
+            key: key.to_owned(),
+            technique: info.id,
+            known: Self::known(info).map(|p| p.key).collect::<Vec<_>>().join(", "),
+        })?;
+        param.kind.check(key, value)?;
+        self.values.insert(key.to_owned(), value.to_owned());
+        Ok(())
+    }
+
+    /// All parameters that a technique has.
+    pub fn known(info: &crate::Info) -> impl Iterator<Item = &'static ParamInfo> {
+        COMMON.iter().chain(info.params)
+    }
+
+    /// Every parameter of a technique with its value.
+    pub fn resolved(&self, info: &crate::Info) -> BTreeMap<String, String> {
+        Self::known(info).map(|p| (p.key.to_owned(), self.get(p).to_owned())).collect()
+    }
+
+    /// The value of a parameter.
+    pub fn get<'a>(&'a self, param: &'a ParamInfo) -> &'a str {
+        self.values.get(param.key).map_or(param.default, String::as_str)
+    }
+
+    /// The value of the parameter of that name, or `""` where the technique has none.
+    pub fn text<'a>(&'a self, info: &'a crate::Info, key: &str) -> &'a str {
+        Self::known(info).find(|p| p.key == key).map_or("", |p| self.get(p))
+    }
+}

@@ -1,0 +1,335 @@
+//! From a scene and a technique to an image.
+
+use std::sync::Arc;
+
+use afterlight_graph::{
+    Executor, FrameReport, Graph, ImageHandle, ResourceId,
+    gpu::{self, vk},
+};
+use afterlight_scene::{Camera, Environment, Light, Projection, Scene};
+use afterlight_shader::{Shader, structs::FrameConstants};
+use glam::{Mat4, Vec3, Vec4};
+
+use crate::{
+    draw_list::{DrawList, DrawOptions},
+    error::TechniqueError,
+    frame::{Frame, FrameBuffers},
+    light_list::LightList,
+    params::Params,
+    present,
+    scene_gpu::{SceneGpu, upload_slice},
+    technique::Technique,
+    volumes,
+};
+
+/// What a frame looks like, whatever the technique.
+#[derive(Clone, Debug)]
+pub struct Settings {
+    /// Image width, pixels, at least 1.
+    pub width_px: u32,
+    /// Image height, pixels, at least 1.
+    pub height_px: u32,
+    /// Visibility samples a pixel.
+    pub samples: u32,
+    /// Camera.
+    pub camera: Camera,
+    /// Lights.
+    pub lights: Vec<Light>,
+    /// What surrounds the scene.
+    pub environment: Environment,
+    /// Keeps the linear radiance after a frame, for [`Prepared::hdr_rgba`]; its memory is then not reused.
+    pub keep_hdr: bool,
+}
+
+impl Settings {
+    /// One sample, the scene's first camera, its own lights.
+    pub fn for_scene(scene: &Scene, width_px: u32, height_px: u32) -> Self {
+        let camera = scene.cameras.first().cloned();
+        Self {
+            width_px,
+            height_px,
+            samples: 1,
+            camera: camera.unwrap_or_else(|| Camera::look_at("default", Vec3::Z, Vec3::ZERO, 1.0, 0.1)),
+            lights: scene.lights.clone(),
+            environment: scene.environment,
+            keep_hdr: false,
+        }
+    }
+}
+
+/// A scene on a device with a view of it: prepares techniques to run.
+pub struct Renderer {
+    device: gpu::Device,
+    scene: Arc<SceneGpu>,
+    lights: Arc<LightList>,
+    settings: Settings,
+    volume: gpu::Buffer,
+    volume_indices: gpu::Buffer,
+    extra_shaders: Vec<Shader>,
+}
+
+impl Renderer {
+    /// Uploads a scene and its lights.
+    ///
+    /// # Errors
+    /// An image that does not decode, something larger than the device takes, the device itself.
+    pub fn new(device: &gpu::Device, scene: &Scene, settings: &Settings) -> Result<Self, TechniqueError> {
+        Self::with_scene(device, SceneGpu::upload(device, scene, &|_, _| {})?, settings)
+    }
+
+    /// As [`Renderer::new`] with a scene that is on the device already.
+    ///
+    /// # Errors
+    /// As [`Renderer::new`].
+    pub fn with_scene(
+        device: &gpu::Device,
+        scene: Arc<SceneGpu>,
+        settings: &Settings,
+    ) -> Result<Self, TechniqueError> {
+        check_size(device, settings)?;
+        let mut uploader = device.uploader()?;
+        let lights = Arc::new(LightList::new(device, &mut uploader, &settings.lights)?);
+        let (vertices, indices) = volumes::icosphere();
+        let volume = upload_slice(device, &mut uploader, "light volume vertices", &vertices)?;
+        let volume_indices = upload_slice(device, &mut uploader, "light volume indices", &indices)?;
+        uploader.finish()?;
+        Ok(Self {
+            device: device.clone(),
+            scene,
+            lights,
+            settings: settings.clone(),
+            volume,
+            volume_indices,
+            extra_shaders: Vec::new(),
+        })
+    }
+
+    /// Adds shaders of techniques from outside this crate; their names come before the built-in ones.
+    pub fn add_shaders(&mut self, shaders: impl IntoIterator<Item = Shader>) {
+        self.extra_shaders.extend(shaders);
+    }
+
+    /// The device.
+    pub fn device(&self) -> &gpu::Device {
+        &self.device
+    }
+
+    /// The scene on the device.
+    pub fn scene(&self) -> &Arc<SceneGpu> {
+        &self.scene
+    }
+
+    /// The lights on the device.
+    pub fn lights(&self) -> &LightList {
+        &self.lights
+    }
+
+    /// The settings.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// Records a technique, plans its graph, allocates memory and compiles pipelines.
+    ///
+    /// # Errors
+    /// Features or sample counts that technique or device lack, the graph, the device.
+    pub fn prepare(&self, technique: &dyn Technique, params: &Params) -> Result<Prepared, TechniqueError> {
+        self.prepare_with(technique, params, |_, _| {})
+    }
+
+    /// As [`Renderer::prepare`]; `also` may declare more passes on the image of linear radiance, for tests.
+    ///
+    /// # Errors
+    /// As [`Renderer::prepare`].
+    pub fn prepare_with(
+        &self,
+        technique: &dyn Technique,
+        params: &Params,
+        also: impl FnOnce(&mut Graph, &ImageHandle),
+    ) -> Result<Prepared, TechniqueError> {
+        let info = technique.info();
+        let missing = technique.missing(self.device.features());
+        if !missing.is_empty() {
+            return Err(TechniqueError::Unavailable { technique: info.id, missing: missing.join(", ") });
+        }
+        if !info.samples.contains(&self.settings.samples) {
+            return Err(TechniqueError::Samples {
+                technique: info.id,
+                found: self.settings.samples,
+                expected: info.samples.iter().map(u32::to_string).collect::<Vec<_>>().join(", "),
+            });
+        }
+        let options = DrawOptions {
+            cull: params.text(info, "cull") == "frustum",
+            near_first: params.text(info, "order") == "near",
+        };
+        let settings = &self.settings;
+        let view = View::new(settings);
+        let mut draws = DrawList::new(&self.device, &self.scene, options)?;
+        draws.update(&self.scene, view.clip_from_world, view.eye_ws)?;
+        let constants = self.device.create_buffer(&gpu::BufferDesc {
+            name: "frame constants",
+            bytes: size_of::<FrameConstants>() as u64,
+            usage: vk::BufferUsageFlags::UNIFORM_BUFFER,
+            memory: gpu::MemoryKind::Upload,
+        })?;
+        constants.write(0, bytemuck::bytes_of(&view.constants(settings, &self.lights)))?;
+
+        let mut graph = Graph::new();
+        let frame = Frame {
+            width_px: settings.width_px,
+            height_px: settings.height_px,
+            samples: settings.samples,
+            params,
+            scene: &self.scene,
+            lights: &self.lights,
+            clip_from_world: view.clip_from_world,
+            background_radiance: settings.environment.background_radiance.into(),
+            buffers: self.import(&mut graph, &constants, &draws),
+            extra_shaders: &self.extra_shaders,
+        };
+        let hdr = technique.record(&mut graph, &frame)?;
+        also(&mut graph, &hdr);
+        let hdr_id = settings.keep_hdr.then(|| graph.keep(&hdr));
+        let final_color = present::tonemap(&mut graph, &frame, &hdr)?;
+        let final_id = graph.keep(&final_color);
+        let plan = graph.plan(&self.device)?;
+        let executor = Executor::new(&self.device, plan)?;
+        Ok(Prepared {
+            executor,
+            hdr: hdr_id,
+            final_color: final_id,
+            draw_calls: draws.visible.iter().map(|b| b.len() as u32).sum(),
+            width_px: settings.width_px,
+            height_px: settings.height_px,
+        })
+    }
+
+    fn import(&self, graph: &mut Graph, constants: &gpu::Buffer, draws: &DrawList) -> FrameBuffers {
+        let s = &self.scene;
+        FrameBuffers {
+            frame: graph.import_buffer("frame constants", constants),
+            draws: graph.import_buffer("scene draws", &s.draws),
+            materials: graph.import_buffer("scene materials", &s.materials),
+            uv_transforms: graph.import_buffer("scene texture transforms", &s.uv_transforms),
+            lights: graph.import_buffer("lights", &self.lights.data),
+            light_spheres: graph.import_buffer("light spheres", &self.lights.spheres),
+            positions: graph.import_buffer("scene positions", &s.positions),
+            attributes: graph.import_buffer("scene attributes", &s.attributes),
+            indices: graph.import_buffer("scene indices", &s.indices),
+            commands: graph.import_buffer("draw commands", &draws.commands),
+            command_counts: graph.import_buffer("draw counts", &draws.counts),
+            volume: graph.import_buffer("light volume vertices", &self.volume),
+            volume_indices: graph.import_buffer("light volume indices", &self.volume_indices),
+        }
+    }
+}
+
+fn check_size(device: &gpu::Device, settings: &Settings) -> Result<(), TechniqueError> {
+    let limit = u64::from(device.features().max_image_dimension_2d);
+    for (what, found) in [("image width in pixels", settings.width_px), ("image height in pixels", settings.height_px)] {
+        if u64::from(found) > limit || found == 0 {
+            return Err(TechniqueError::TooLarge { what: what.to_owned(), found: found.into(), limit });
+        }
+    }
+    Ok(())
+}
+
+/// A technique ready to run, as often as wanted.
+pub struct Prepared {
+    executor: Executor,
+    hdr: Option<ResourceId>,
+    final_color: ResourceId,
+    /// Draws in view.
+    pub draw_calls: u32,
+    width_px: u32,
+    height_px: u32,
+}
+
+impl Prepared {
+    /// Renders a frame and waits for it.
+    ///
+    /// # Errors
+    /// The device.
+    pub fn run(&mut self) -> Result<FrameReport, TechniqueError> {
+        Ok(self.executor.run()?)
+    }
+
+    /// The last frame, tone-mapped, sRGB, RGBA with 8 bits a channel, rows from the top.
+    ///
+    /// # Errors
+    /// The device.
+    pub fn final_rgba8(&mut self) -> Result<Vec<u8>, TechniqueError> {
+        Ok(self.executor.read_image(self.final_color)?)
+    }
+
+    /// The last frame's linear radiance, RGBA, rows from the top; `None` unless [`Settings::keep_hdr`] was set.
+    ///
+    /// # Errors
+    /// The device.
+    pub fn hdr_rgba(&mut self) -> Result<Option<Vec<f32>>, TechniqueError> {
+        let Some(hdr) = self.hdr else { return Ok(None) };
+        let bytes = self.executor.read_image(hdr)?;
+        let halves = bytes.chunks_exact(2).map(|b| half::f16::from_le_bytes([b[0], b[1]]).to_f32());
+        Ok(Some(halves.collect()))
+    }
+
+    /// Width and height in pixels.
+    pub fn size_px(&self) -> (u32, u32) {
+        (self.width_px, self.height_px)
+    }
+
+    /// The executor, for memory figures and buffers that were kept.
+    pub fn executor(&mut self) -> &mut Executor {
+        &mut self.executor
+    }
+}
+
+/// A camera's matrices for an image size.
+struct View {
+    clip_from_world: Mat4,
+    view_from_world: Mat4,
+    eye_ws: Vec3,
+}
+
+impl View {
+    fn new(settings: &Settings) -> Self {
+        let aspect = settings.width_px as f32 / settings.height_px as f32;
+        let view_from_world = settings.camera.view_from_world();
+        Self {
+            clip_from_world: settings.camera.clip_from_view(aspect) * view_from_world,
+            view_from_world,
+            eye_ws: settings.camera.eye_ws(),
+        }
+    }
+
+    fn constants(&self, settings: &Settings, lights: &LightList) -> FrameConstants {
+        // The view looks along -z, so a point's distance is minus the third row of view_from_world.
+        let distance_from_world = -self.view_from_world.row(2);
+        let to_eye = self.view_from_world.row(2).truncate();
+        let (depth_to_distance, eye) = match settings.camera.projection {
+            Projection::Perspective { near_m, .. } => (Vec4::new(0.0, near_m, 1.0, 0.0), self.eye_ws.extend(1.0)),
+            Projection::Orthographic { near_m, far_m, .. } => {
+                (Vec4::new(near_m - far_m, far_m, 0.0, 1.0), to_eye.extend(0.0))
+            }
+        };
+        FrameConstants {
+            clip_from_world: self.clip_from_world.to_cols_array_2d(),
+            world_from_clip: inverse(self.clip_from_world),
+            depth_to_distance: depth_to_distance.into(),
+            distance_from_world: distance_from_world.into(),
+            eye_ws: eye.into(),
+            size_px: [settings.width_px, settings.height_px],
+            tile_count: [settings.width_px.div_ceil(16), settings.height_px.div_ceil(16)],
+            ambient_radiance: settings.environment.ambient_radiance.into(),
+            light_count: lights.count,
+            background_radiance: settings.environment.background_radiance.into(),
+            unbounded_light_count: lights.unbounded_count,
+        }
+    }
+}
+
+/// Inverse, computed in 64 bits: positions are reconstructed through it.
+fn inverse(m: Mat4) -> [[f32; 4]; 4] {
+    m.as_dmat4().inverse().as_mat4().to_cols_array_2d()
+}

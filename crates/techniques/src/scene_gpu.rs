@@ -1,0 +1,305 @@
+//! A scene on the device: vertices, draws, materials, textures.
+
+use std::sync::Arc;
+
+use afterlight_graph::gpu::{self, vk};
+use afterlight_scene::{Aabb, AlphaMode, Image, Material, Mesh, Scene, TextureRef};
+use afterlight_shader::structs::{
+    DRAW_MIRRORED, DrawData, MATERIAL_DOUBLE_SIDED, MATERIAL_UNLIT, MaterialData, NO_TEXTURE, TRIANGLE_BITS,
+};
+
+use crate::{
+    error::TechniqueError,
+    textures::{Role, TextureTable},
+};
+
+/// Most triangles of one draw. A triangle ID keeps the triangle's number within its draw in `TRIANGLE_BITS` bits, and
+/// draws are what is culled: larger draws cull worse, smaller ones cost more commands.
+pub(crate) const DRAW_TRIANGLES: u32 = 1 << TRIANGLE_BITS;
+
+/// Kinds of draws, which differ in pipeline or fixed-function state; draws of one kind are one indirect call.
+pub(crate) const BUCKETS: usize = 8;
+
+/// What of a draw the CPU needs: for culling, sorting and the indirect command.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct DrawInfo {
+    pub bounds_ws: Aabb,
+    pub index_count: u32,
+    pub first_index: u32,
+    pub first_vertex: u32,
+}
+
+/// Bucket of a draw: alpha-masked 4, double-sided 2, mirrored 1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Bucket(pub usize);
+
+impl Bucket {
+    pub fn masked(self) -> bool {
+        self.0 & 4 != 0
+    }
+    pub fn double_sided(self) -> bool {
+        self.0 & 2 != 0
+    }
+    pub fn mirrored(self) -> bool {
+        self.0 & 1 != 0
+    }
+}
+
+/// A scene uploaded once and shared by all techniques. Surfaces with alpha blending are left out (with a warning) until
+/// a technique draws them.
+pub struct SceneGpu {
+    pub(crate) positions: gpu::Buffer,
+    pub(crate) attributes: gpu::Buffer,
+    pub(crate) indices: gpu::Buffer,
+    pub(crate) draws: gpu::Buffer,
+    pub(crate) materials: gpu::Buffer,
+    pub(crate) uv_transforms: gpu::Buffer,
+    pub(crate) texture_set: gpu::DescriptorSet,
+    /// Specialization constants that fit the scene, by name.
+    pub(crate) constants: Vec<(&'static str, u32)>,
+    pub(crate) draw_infos: Vec<DrawInfo>,
+    /// First draw of each bucket; one more entry for the end.
+    pub(crate) bucket_first: [u32; BUCKETS + 1],
+    /// Triangles that are drawn.
+    pub triangle_count: u64,
+    /// Vertices in memory.
+    pub vertex_count: u64,
+    /// Bytes on the device, textures included.
+    pub bytes: u64,
+    /// What was changed or left out, a line each.
+    pub warnings: Vec<String>,
+}
+
+/// Reports progress of an upload: steps done, steps in all.
+pub type Progress<'a> = &'a (dyn Fn(usize, usize) + Sync);
+
+impl SceneGpu {
+    /// Uploads a scene; textures are decoded in parallel, a few at a time.
+    ///
+    /// # Errors
+    /// An image that does not decode or is larger than the device takes; too many draws; the device.
+    pub fn upload(device: &gpu::Device, scene: &Scene, progress: Progress<'_>) -> Result<Arc<Self>, TechniqueError> {
+        let mut uploader = device.uploader()?;
+        let mut warnings = Vec::new();
+        let draws = DrawTable::new(scene, &mut warnings)?;
+        let table = TextureTable::plan(scene, device.features(), &mut warnings)?;
+        let (materials, transforms) = material_records(&scene.materials, &table);
+
+        let positions = upload_slice(device, &mut uploader, "scene positions", &scene.positions_os)?;
+        let attributes = upload_slice(device, &mut uploader, "scene attributes", &scene.attributes)?;
+        let indices = upload_slice(device, &mut uploader, "scene indices", &scene.indices)?;
+        let draw_buffer = upload_slice(device, &mut uploader, "scene draws", &draws.data)?;
+        let materials = upload_slice(device, &mut uploader, "scene materials", &materials)?;
+        let uv_transforms = upload_slice(device, &mut uploader, "scene texture transforms", &transforms)?;
+        let textures = table.upload(device, &mut uploader, &scene.images, progress)?;
+        uploader.finish()?;
+
+        let [srgb, normal, data] = table.bucket_counts();
+        let constants = vec![
+            ("SRGB_BUCKETS", srgb),
+            ("NORMAL_BUCKETS", normal),
+            ("DATA_BUCKETS", data),
+            ("HAS_UV1", u32::from(uses_uv1(&scene.materials))),
+            ("HAS_VERTEX_COLOR", u32::from(scene.attributes.iter().any(|a| a.color_rgba8 != u32::MAX))),
+            ("HAS_UV_TRANSFORM", u32::from(!transforms.is_empty())),
+        ];
+        let buffers = [&positions, &attributes, &indices, &draw_buffer, &materials, &uv_transforms];
+        Ok(Arc::new(Self {
+            bytes: buffers.iter().map(|b| b.allocated_bytes()).sum::<u64>() + textures.bytes,
+            texture_set: textures.set,
+            constants,
+            triangle_count: draws.infos.iter().map(|d| u64::from(d.index_count / 3)).sum(),
+            vertex_count: scene.positions_os.len() as u64,
+            draw_infos: draws.infos,
+            bucket_first: draws.bucket_first,
+            draws: draw_buffer,
+            positions,
+            attributes,
+            indices,
+            materials,
+            uv_transforms,
+            warnings,
+        }))
+    }
+
+    /// Number of draws: pieces of at most 1,024 triangles.
+    pub fn draw_count(&self) -> usize {
+        self.draw_infos.len()
+    }
+}
+
+/// Uploads a slice into a storage buffer that may also be a vertex or index buffer; an empty slice gives a buffer of
+/// zeros, since empty buffers do not exist.
+pub(crate) fn upload_slice<T: bytemuck::NoUninit>(
+    device: &gpu::Device,
+    uploader: &mut gpu::Uploader,
+    name: &str,
+    data: &[T],
+) -> Result<gpu::Buffer, gpu::GpuError> {
+    let zeros = [0u8; 64];
+    let bytes = if data.is_empty() { &zeros[..] } else { bytemuck::cast_slice(data) };
+    let buffer = device.create_buffer(&gpu::BufferDesc {
+        name,
+        bytes: bytes.len() as u64,
+        usage: vk::BufferUsageFlags::STORAGE_BUFFER
+            | vk::BufferUsageFlags::VERTEX_BUFFER
+            | vk::BufferUsageFlags::INDEX_BUFFER
+            | vk::BufferUsageFlags::TRANSFER_DST,
+        memory: gpu::MemoryKind::DeviceLocal,
+    })?;
+    uploader.buffer(&buffer, 0, bytes)?;
+    Ok(buffer)
+}
+
+/// All draws of a scene by bucket.
+struct DrawTable {
+    data: Vec<DrawData>,
+    infos: Vec<DrawInfo>,
+    bucket_first: [u32; BUCKETS + 1],
+}
+
+impl DrawTable {
+    fn new(scene: &Scene, warnings: &mut Vec<String>) -> Result<Self, TechniqueError> {
+        let pieces: Vec<Vec<Aabb>> = scene.meshes.iter().map(|mesh| piece_bounds(scene, mesh)).collect();
+        let mut by_bucket: [Vec<(DrawData, DrawInfo)>; BUCKETS] = Default::default();
+        let mut blended = 0u64;
+        for instance in &scene.instances {
+            let mesh = &scene.meshes[instance.mesh as usize];
+            let material = &scene.materials[mesh.material as usize];
+            if material.alpha_mode == AlphaMode::Blend {
+                blended += 1;
+                continue;
+            }
+            let m = &instance.world_from_object;
+            let mirrored = m.matrix3.determinant() < 0.0;
+            let masked = matches!(material.alpha_mode, AlphaMode::Mask { .. });
+            let bucket = 4 * usize::from(masked) + 2 * usize::from(material.double_sided) + usize::from(mirrored);
+            let rows = [0, 1, 2].map(|i| {
+                let row = m.matrix3.row(i);
+                [row.x, row.y, row.z, m.translation[i]]
+            });
+            for (piece, bounds_os) in pieces[instance.mesh as usize].iter().enumerate() {
+                let first = piece as u32 * DRAW_TRIANGLES * 3;
+                let first_index = mesh.first_index + first;
+                by_bucket[bucket].push((
+                    DrawData {
+                        object_row0: rows[0],
+                        object_row1: rows[1],
+                        object_row2: rows[2],
+                        first_index,
+                        first_vertex: mesh.first_vertex,
+                        material: mesh.material,
+                        flags: if mirrored { DRAW_MIRRORED } else { 0 },
+                    },
+                    DrawInfo {
+                        bounds_ws: bounds_os.transformed(m),
+                        index_count: (mesh.index_count - first).min(DRAW_TRIANGLES * 3),
+                        first_index,
+                        first_vertex: mesh.first_vertex,
+                    },
+                ));
+            }
+        }
+        if blended > 0 {
+            warnings.push(format!("{blended} draws with alpha blending are left out: no opaque technique shows them"));
+        }
+        let mut table = Self { data: Vec::new(), infos: Vec::new(), bucket_first: [0; BUCKETS + 1] };
+        for (bucket, draws) in by_bucket.into_iter().enumerate() {
+            for (data, info) in draws {
+                table.data.push(data);
+                table.infos.push(info);
+            }
+            table.bucket_first[bucket + 1] = table.data.len() as u32;
+        }
+        let limit = u64::from(u32::MAX >> TRIANGLE_BITS);
+        if table.data.len() as u64 >= limit {
+            return Err(TechniqueError::TooLarge {
+                what: format!("draws of at most {DRAW_TRIANGLES} triangles in the scene"),
+                found: table.data.len() as u64,
+                limit: limit - 1,
+            });
+        }
+        Ok(table)
+    }
+}
+
+/// Object-space bounds of each piece of a mesh.
+fn piece_bounds(scene: &Scene, mesh: &Mesh) -> Vec<Aabb> {
+    let first = mesh.first_index as usize;
+    let indices = &scene.indices[first..first + mesh.index_count as usize];
+    let positions = &scene.positions_os[mesh.first_vertex as usize..];
+    indices
+        .chunks(DRAW_TRIANGLES as usize * 3)
+        .map(|piece| {
+            let mut bounds = Aabb::EMPTY;
+            for &i in piece {
+                bounds.extend(positions[i as usize].into());
+            }
+            bounds
+        })
+        .collect()
+}
+
+fn uses_uv1(materials: &[Material]) -> bool {
+    materials.iter().any(|m| slots(m).iter().any(|(t, _)| t.is_some_and(|t| t.uv_set == 1)))
+}
+
+/// A material's textures in the order of the slots in `MaterialData`.
+pub(crate) fn slots(m: &Material) -> [(Option<TextureRef>, Role); 5] {
+    [
+        (m.base_color_texture, Role::BaseColor),
+        (m.metallic_roughness_texture, Role::Data),
+        (m.normal_texture, Role::Normal),
+        (m.occlusion_texture, Role::Data),
+        (m.emissive_texture, Role::Emissive),
+    ]
+}
+
+const IDENTITY_TRANSFORM: [[f32; 3]; 2] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+
+/// Material records and the rows of all texture transforms, five transforms for each material that has one.
+fn material_records(materials: &[Material], table: &TextureTable) -> (Vec<MaterialData>, Vec<[f32; 4]>) {
+    let mut transforms = Vec::new();
+    let records = materials
+        .iter()
+        .map(|m| {
+            let slots = slots(m);
+            let first = (transforms.len() / 2) as u32;
+            let transformed = |t: &TextureRef| t.uv_transform != IDENTITY_TRANSFORM;
+            if slots.iter().any(|(t, _)| t.as_ref().is_some_and(transformed)) {
+                for (t, _) in &slots {
+                    let rows = t.map_or(IDENTITY_TRANSFORM, |t| t.uv_transform);
+                    transforms.extend(rows.map(|[a, b, c]| [a, b, c, 0.0]));
+                }
+            }
+            let [base_color, metallic_roughness, normal, occlusion, emissive] = slots.map(|(t, role)| {
+                t.map_or(NO_TEXTURE, |t| {
+                    table.slot(&t, role) | t.uv_set.min(1) << 24 | u32::from(transformed(&t)) << 25
+                })
+            });
+            MaterialData {
+                base_color_factor: m.base_color_factor,
+                emissive_factor: m.emissive_factor,
+                alpha_cutoff: if let AlphaMode::Mask { cutoff } = m.alpha_mode { cutoff } else { 0.0 },
+                metallic_factor: m.metallic_factor,
+                roughness_factor: m.roughness_factor,
+                normal_scale: m.normal_scale,
+                occlusion_strength: m.occlusion_strength,
+                flags: u32::from(m.unlit) * MATERIAL_UNLIT | u32::from(m.double_sided) * MATERIAL_DOUBLE_SIDED,
+                uv_transform: first,
+                base_color_slot: base_color,
+                metallic_roughness_slot: metallic_roughness,
+                normal_slot: normal,
+                occlusion_slot: occlusion,
+                emissive_slot: emissive,
+                _padding: 0,
+            }
+        })
+        .collect();
+    (records, transforms)
+}
+
+/// Names of images for messages.
+pub(crate) fn image_name(images: &[Image], index: u32) -> &str {
+    images.get(index as usize).map_or("image", |i| i.name.as_str())
+}

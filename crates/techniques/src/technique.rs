@@ -1,0 +1,123 @@
+//! What a technique is.
+
+use afterlight_graph::{Graph, ImageHandle, gpu};
+use serde::Serialize;
+
+use crate::{
+    cost::{Cost, Workload},
+    error::TechniqueError,
+    frame::Frame,
+    params::{ParamInfo, Params},
+};
+
+/// Where a technique comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Source {
+    /// Key in REFERENCES.toml.
+    pub key: &'static str,
+    /// Section of that work.
+    pub section: &'static str,
+}
+
+/// A technique's answers to the four questions of ARCHITECTURE.md.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Answers {
+    /// What the geometry pass keeps of a visible surface.
+    pub surface: &'static str,
+    /// How lights and surfaces find each other.
+    pub lights: &'static str,
+    /// Where and at what rate shading is evaluated.
+    pub schedule: &'static str,
+    /// How samples become a pixel.
+    pub resolve: &'static str,
+}
+
+/// A row of Petrescu et al. 2016, Appendix A; `y`, `n` or `p` (partial).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct AppendixA {
+    /// The paper's abbreviation.
+    pub id: &'static str,
+    /// Light-object intersection: `imp` through the raster, `exp` explicit structure, `dec` decoupled.
+    pub intersect: &'static str,
+    /// Transparency.
+    pub transparency: &'static str,
+    /// Hardware multisampling.
+    pub hardware_msaa: &'static str,
+    /// Access to lights: `rand` or `seq`.
+    pub light_access: &'static str,
+    /// Access to materials: `rand` or `seq`.
+    pub material_access: &'static str,
+    /// Whether visibility and shading rates are decoupled, in space and in time.
+    pub rates_decoupled: &'static str,
+}
+
+/// Whether a technique computes the reference's image.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case", tag = "kind")]
+pub enum Exactness {
+    /// The same image up to rounding: the least PSNR to `forward` at one sample, dB.
+    Exact {
+        /// Least PSNR at one sample.
+        min_psnr_db: f64,
+    },
+    /// Another image within a bound that a test measured.
+    Approximate {
+        /// The bound in words.
+        bound: &'static str,
+        /// Least PSNR, dB.
+        min_psnr_db: f64,
+    },
+}
+
+/// A feature that a technique needs of the device.
+#[derive(Clone, Copy)]
+pub struct Need {
+    /// Name for `devices`.
+    pub name: &'static str,
+    /// Whether the device has it.
+    pub test: fn(&gpu::Features) -> bool,
+}
+
+/// A technique's constant facts.
+pub struct Info {
+    /// Name on the command line.
+    pub id: &'static str,
+    /// Title in full.
+    pub title: &'static str,
+    /// One sentence.
+    pub summary: &'static str,
+    /// Sources.
+    pub sources: &'static [Source],
+    /// Answers to the four questions.
+    pub answers: Answers,
+    /// Its row of Appendix A.
+    pub appendix_a: AppendixA,
+    /// Exact or approximate.
+    pub exactness: Exactness,
+    /// Its parameters besides those that all have ([`crate::params::COMMON`]).
+    pub params: &'static [ParamInfo],
+    /// What it needs beyond what the program needs.
+    pub needs: &'static [Need],
+    /// Sample counts that it can render.
+    pub samples: &'static [u32],
+}
+
+/// A way to render a frame.
+pub trait Technique: Send + Sync {
+    /// Facts about it.
+    fn info(&self) -> &Info;
+
+    /// Predicts its costs for a workload by the formulas of Petrescu et al. 2016, section 4. Pure arithmetic.
+    fn predict(&self, workload: &Workload, params: &Params) -> Cost;
+
+    /// Declares its passes, named `id/stage`, and returns the image of linear radiance, RGBA16F, that they end in.
+    ///
+    /// # Errors
+    /// [`TechniqueError`] where the frame asks for what it cannot do.
+    fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError>;
+
+    /// What of `info().needs` a device lacks.
+    fn missing(&self, features: &gpu::Features) -> Vec<&'static str> {
+        self.info().needs.iter().filter(|n| !(n.test)(features)).map(|n| n.name).collect()
+    }
+}
