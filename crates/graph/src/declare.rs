@@ -828,6 +828,7 @@ impl Graph {
             _ => None,
         };
         if let Some((what, found, expected)) = bad {
+            let expected = expected.to_owned();
             self.errors.push(GraphError::BadResource { name: name.to_owned(), what, found, expected });
         }
         if self.resources.iter().any(|other| other.name == name) {

@@ -189,7 +189,7 @@ pub enum GraphError {
         /// What was declared.
         found: String,
         /// What is allowed.
-        expected: &'static str,
+        expected: String,
     },
     /// A read back asks for a resource that the plan does not hold, or did not keep.
     #[error("cannot read back {name:?}: {found}; expected one of the kept resources: {expected}")]

@@ -8,7 +8,9 @@
 mod bind;
 mod declare;
 mod error;
+mod execute;
 mod plan;
+mod report;
 #[cfg(test)]
 mod tests;
 
@@ -20,6 +22,8 @@ pub use declare::{
     Subresource, VertexAttribute, VertexLayout, VertexStream,
 };
 pub use error::GraphError;
+pub use execute::{Executor, ResourceKey};
 pub use plan::{
     Access, Barrier, MemoryNeed, Placement, Plan, PlannedHeap, PlannedPass, PlannedResource, Requirements,
 };
+pub use report::{FrameReport, PassReport, ResourceReport, Statistics};
