@@ -1,0 +1,157 @@
+//! Every exact technique against `forward` on the same scene (ladder step d), several times, since races show as errors
+//! that move between runs.
+
+mod common;
+
+use afterlight_techniques::{
+    Exactness, find, registry,
+    scene::{Camera, Scene},
+};
+use common::{Stage, covered, image_of, psnr, wider};
+use glam::Vec3;
+
+fn min_psnr(exactness: Exactness) -> f64 {
+    match exactness {
+        Exactness::Exact { min_psnr_db } | Exactness::Approximate { min_psnr_db, .. } => min_psnr_db,
+    }
+}
+
+/// Compares all techniques to `forward`; returns the least margin in dB.
+fn all_agree(stage: &Stage, settings: &afterlight_techniques::Settings, what: &str, runs: usize) {
+    let reference = stage.image(find("forward").unwrap(), settings);
+    for technique in registry() {
+        let info = technique.info();
+        let mut prepared = stage.prepare(*technique, settings);
+        for run in 0..runs {
+            let image = image_of(&mut prepared);
+            let db = psnr(&reference, &image);
+            println!("{what}: {} run {run}: {db:.2} dB", info.id);
+            assert!(db >= min_psnr(info.exactness), "{what}: {} run {run}: {db:.2} dB to forward", info.id);
+        }
+    }
+}
+
+#[test]
+fn on_the_colonnade_with_100_lights() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=30000");
+    let settings = stage.settings((160, 90), 100);
+    let reference = stage.image(find("forward").unwrap(), &settings);
+    assert!(covered(&reference) > 0.5, "the view shows little: {}", covered(&reference));
+    all_agree(&stage, &settings, "colonnade", 3);
+}
+
+#[test]
+fn a_range_larger_by_two_percent_is_caught() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=30000");
+    let settings = stage.settings((160, 90), 100);
+    let mutant = afterlight_techniques::Settings { lights: wider(&settings.lights, 1.02), ..settings.clone() };
+    let forward = find("forward").unwrap();
+    let db = psnr(&stage.image(forward, &settings), &stage.image(forward, &mutant));
+    assert!(db < 45.0, "a mutant within the bound: {db:.2} dB");
+}
+
+#[test]
+fn a_dropped_light_is_caught() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=30000");
+    let settings = stage.settings((160, 90), 100);
+    let forward = find("forward").unwrap();
+    let reference = stage.image(forward, &settings);
+    // One light of those that reach the view most.
+    let db = (0..settings.lights.len())
+        .step_by(10)
+        .map(|i| {
+            let mut mutant = settings.clone();
+            mutant.lights.remove(i);
+            psnr(&reference, &stage.image(forward, &mutant))
+        })
+        .fold(f64::INFINITY, f64::min);
+    assert!(db < 45.0, "a mutant within the bound: {db:.2} dB");
+}
+
+#[test]
+fn on_sponza_with_100_lights() {
+    let gpu = afterlight_testkit::gpu();
+    let Some(scenes) = afterlight_testkit::shared_scenes() else { return };
+    let stage = Stage::new(&gpu, &scenes.join("sponza/sponza.gltf").to_string_lossy());
+    let camera = Camera::look_at("view", Vec3::new(-9.0, 2.5, 0.0), Vec3::new(5.0, 3.0, 0.0), 60f32.to_radians(), 0.1);
+    let settings = stage.from(camera, (320, 180), 100);
+    all_agree(&stage, &settings, "sponza", 2);
+}
+
+#[test]
+fn at_odd_sizes() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=5000");
+    for size in [(1, 1), (17, 3), (3, 33), (640, 360)] {
+        all_agree(&stage, &stage.settings(size, 20), &format!("{size:?}"), 1);
+    }
+}
+
+#[test]
+fn at_2160p() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:sphere?segments=64");
+    all_agree(&stage, &stage.settings((3840, 2160), 0), "3840x2160", 1);
+}
+
+#[test]
+fn with_0_1_and_10_000_lights() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=3000");
+    for count in [1, 10_000] {
+        all_agree(&stage, &stage.settings((48, 27), count), &format!("{count} lights"), 1);
+    }
+    let mut none = stage.settings((48, 27), 1);
+    none.lights.clear();
+    all_agree(&stage, &none, "0 lights", 1);
+}
+
+#[test]
+fn with_the_camera_in_a_wall_and_looking_away() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=5000");
+    let bounds = stage.scene.bounds_ws();
+    let views = [
+        ("in a wall", bounds.min + bounds.size() * Vec3::new(0.5, 0.3, 0.002), bounds.center()),
+        ("looking away", bounds.max + bounds.size(), bounds.max + bounds.size() * 2.0),
+        ("straight down", bounds.center(), bounds.center() - Vec3::Y),
+        ("far outside", bounds.center() + bounds.size() * 50.0, bounds.center()),
+    ];
+    for (what, eye, target) in views {
+        let camera = Camera::look_at(what, eye, target, 1.0, 0.05);
+        all_agree(&stage, &stage.from(camera, (96, 54), 50), what, 1);
+    }
+}
+
+#[test]
+fn inside_light_volumes_and_with_all_kinds_of_lights() {
+    use afterlight_techniques::scene::{Light, LightKind};
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=5000");
+    let mut settings = stage.settings((96, 54), 8);
+    let eye = settings.camera.eye_ws();
+    let light = |kind, range_m| Light {
+        kind,
+        position_ws: eye + Vec3::new(0.1, 0.3, 0.2),
+        direction_ws: Vec3::new(0.3, -0.8, -0.5).normalize(),
+        intensity: Vec3::new(3.0, 2.0, 1.0),
+        range_m,
+    };
+    settings.lights.extend([
+        light(LightKind::Point, 6.0),
+        light(LightKind::Spot { inner_angle_rad: 0.3, outer_angle_rad: 0.9 }, 20.0),
+        light(LightKind::Spot { inner_angle_rad: 0.0, outer_angle_rad: 0.5 }, f32::INFINITY),
+        light(LightKind::Directional, f32::INFINITY),
+    ]);
+    all_agree(&stage, &settings, "all kinds", 1);
+}
+
+#[test]
+fn on_an_empty_scene() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::of(&gpu, Scene::default());
+    all_agree(&stage, &stage.settings((20, 20), 0), "empty", 1);
+}

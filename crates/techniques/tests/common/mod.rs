@@ -1,0 +1,90 @@
+//! What the tests of whole techniques share: a scene on the validated device, images, comparisons.
+#![allow(dead_code)] // each test file uses a part
+
+use std::sync::Arc;
+
+use afterlight_image::{Rgba8Image, psnr_db};
+use afterlight_techniques::{
+    Params, Prepared, Renderer, SceneGpu, Settings, Technique,
+    graph::gpu,
+    scene::{self, Camera, Light, Scene, lights::seeded_lights},
+};
+
+/// A scene on the device.
+pub struct Stage {
+    pub device: gpu::Device,
+    pub scene: Scene,
+    pub uploaded: Arc<SceneGpu>,
+}
+
+impl Stage {
+    /// Loads and uploads a scene.
+    pub fn new(device: &gpu::Device, source: &str) -> Self {
+        let scene = scene::load_source(source, &scene::LoadOptions::default()).unwrap_or_else(|e| panic!("{e}"));
+        Self::of(device, scene)
+    }
+
+    /// Uploads a scene.
+    pub fn of(device: &gpu::Device, scene: Scene) -> Self {
+        let uploaded = SceneGpu::upload(device, &scene, &|_, _| {}).unwrap_or_else(|e| panic!("{e}"));
+        Self { device: device.clone(), scene, uploaded }
+    }
+
+    /// Settings with seeded lights; none given are the scene's own.
+    pub fn settings(&self, size: (u32, u32), lights: u32) -> Settings {
+        let mut settings = Settings::for_scene(&self.scene, size.0, size.1);
+        if lights > 0 {
+            settings.lights = seeded_lights(&self.scene.bounds_ws(), lights, 1);
+        }
+        settings
+    }
+
+    /// The same from another camera.
+    pub fn from(&self, camera: Camera, size: (u32, u32), lights: u32) -> Settings {
+        Settings { camera, ..self.settings(size, lights) }
+    }
+
+    /// A technique made ready.
+    pub fn prepare(&self, technique: &dyn Technique, settings: &Settings) -> Prepared {
+        let renderer = Renderer::with_scene(&self.device, self.uploaded.clone(), settings).unwrap_or_else(|e| panic!("{e}"));
+        let prepared = renderer.prepare(technique, &Params::default());
+        prepared.unwrap_or_else(|e| panic!("{}: {e}", technique.info().id))
+    }
+
+    /// A technique's image.
+    pub fn image(&self, technique: &dyn Technique, settings: &Settings) -> Rgba8Image {
+        let mut prepared = self.prepare(technique, settings);
+        image_of(&mut prepared)
+    }
+
+    /// A technique's linear radiance, RGBA.
+    pub fn radiance(&self, technique: &dyn Technique, settings: &Settings) -> Vec<[f32; 4]> {
+        let mut prepared = self.prepare(technique, &Settings { keep_hdr: true, ..settings.clone() });
+        prepared.run().unwrap_or_else(|e| panic!("{e}"));
+        let rgba = prepared.hdr_rgba().unwrap_or_else(|e| panic!("{e}")).expect("kept");
+        rgba.chunks_exact(4).map(|c| [c[0], c[1], c[2], c[3]]).collect()
+    }
+}
+
+/// Runs a frame and reads its image.
+pub fn image_of(prepared: &mut Prepared) -> Rgba8Image {
+    prepared.run().unwrap_or_else(|e| panic!("{e}"));
+    let (width, height) = prepared.size_px();
+    Rgba8Image { width, height, pixels: prepared.final_rgba8().unwrap_or_else(|e| panic!("{e}")) }
+}
+
+/// PSNR in dB, infinite where equal.
+pub fn psnr(a: &Rgba8Image, b: &Rgba8Image) -> f64 {
+    psnr_db(a, b).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// Share of pixels that show something else than the background colour of the first pixel's kind: black.
+pub fn covered(image: &Rgba8Image) -> f64 {
+    let lit = image.pixels.chunks_exact(4).filter(|p| p[..3] != [0, 0, 0]).count();
+    lit as f64 / f64::from(image.width * image.height)
+}
+
+/// Lights whose range is larger by a factor: a mutant that comparisons must catch.
+pub fn wider(lights: &[Light], factor: f32) -> Vec<Light> {
+    lights.iter().map(|l| Light { range_m: l.range_m * factor, ..*l }).collect()
+}
