@@ -30,6 +30,22 @@ pub struct Run {
     pub settings: SettingsRecord,
     /// One a technique.
     pub results: Vec<RunResult>,
+    /// What the whole process took, where it did nothing but render one image.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub process: Option<ProcessRecord>,
+}
+
+/// What a process took from its start to its first image.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ProcessRecord {
+    /// Reading the scene while the device opens, ms.
+    pub load_ms: f64,
+    /// Decoding textures and copying the scene to the device, ms.
+    pub upload_ms: f64,
+    /// From the program's start to the image in its file, ms.
+    pub first_image_ms: f64,
+    /// The most memory that the process held, bytes; none where the system does not tell.
+    pub peak_resident_bytes: Option<u64>,
 }
 
 /// A Vulkan device.
@@ -241,6 +257,7 @@ mod tests {
                 version: "0".into(),
             },
             results: vec![result],
+            process: None,
         }
     }
 

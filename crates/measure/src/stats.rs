@@ -32,12 +32,6 @@ impl Spread {
         };
         Some(Spread { median, min, max })
     }
-
-    /// Summarises nanoseconds as milliseconds.
-    pub fn of_ns(samples_ns: &[u64]) -> Option<Spread> {
-        let samples_ms: Vec<f64> = samples_ns.iter().map(|ns| *ns as f64 / 1e6).collect();
-        Spread::of(&samples_ms)
-    }
 }
 
 #[cfg(test)]
@@ -58,11 +52,5 @@ mod tests {
             Some(Spread { median: 2.0, min: 2.0, max: 2.0 })
         );
         assert_eq!(Spread::of(&[f64::NAN]), None);
-    }
-
-    #[test]
-    fn nanoseconds_become_milliseconds() {
-        let spread = Spread::of_ns(&[1_500_000, 2_500_000]);
-        assert_eq!(spread, Some(Spread { median: 2.0, min: 1.5, max: 2.5 }));
     }
 }

@@ -1,0 +1,339 @@
+//! The command line.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+use crate::failure::Failure;
+
+/// Most lights that `--lights` takes.
+const LIGHTS_MAX: i64 = 1_000_000;
+
+/// The scene where none is named.
+pub const DEFAULT_SCENE: &str = "builtin:colonnade";
+
+/// A workbench of deferred-shading techniques: one scene, one image, many ways, each one timed.
+#[derive(Debug, Parser)]
+#[command(name = "afterlight", version, arg_required_else_help = true, max_term_width = 110)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// The commands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// List Vulkan devices, and which techniques run on each
+    Devices(ListArgs),
+    /// List techniques: sources, properties, parameters
+    Techniques(ListArgs),
+    /// Tell what a scene holds
+    Scene(SceneArgs),
+    /// Render one image with one technique
+    Render(RenderArgs),
+    /// Run techniques on the same view and compare times, memory and images
+    Compare(CompareArgs),
+    /// Run experiments
+    Bench(BenchArgs),
+    /// Print shell completions
+    Completions(CompletionsArgs),
+}
+
+/// Options of lists.
+#[derive(Debug, Args)]
+pub struct ListArgs {
+    #[command(flatten)]
+    pub json: JsonArgs,
+}
+
+/// Where JSON goes.
+#[derive(Clone, Debug, Args)]
+pub struct JsonArgs {
+    /// Write JSON to FILE, or to standard output (`-`, or no FILE)
+    #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = "-")]
+    pub json: Option<PathBuf>,
+}
+
+impl JsonArgs {
+    /// Whether JSON goes to standard output, so that nothing else may.
+    pub fn on_stdout(&self) -> bool {
+        self.json.as_ref().is_some_and(|path| path.as_os_str() == "-")
+    }
+
+    /// Refuses a scene taken for the file of `--json`: it would be overwritten.
+    pub fn check(&self) -> Result<(), Failure> {
+        let Some(path) = &self.json else { return Ok(()) };
+        let extension = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+        let is_scene = path.to_string_lossy().starts_with("builtin:")
+            || ["gltf", "glb", "obj"].contains(&extension.as_str());
+        if is_scene {
+            let expected = "a file for JSON, or `-`; put the scene before --json";
+            return Err(Failure::option("--json", format!("the scene {}", path.display()), expected));
+        }
+        Ok(())
+    }
+}
+
+/// Arguments of `scene`.
+#[derive(Debug, Args)]
+pub struct SceneArgs {
+    /// A .gltf, .glb or .obj file, or builtin:NAME[?key=value&…]
+    #[arg(default_value = DEFAULT_SCENE)]
+    pub scene: String,
+    /// Time at which animated nodes are posed, seconds
+    #[arg(long, value_name = "SECONDS", value_parser = finite)]
+    pub time: Option<f64>,
+    #[command(flatten)]
+    pub json: JsonArgs,
+}
+
+/// Arguments of `render`.
+#[derive(Debug, Args)]
+pub struct RenderArgs {
+    /// A .gltf, .glb or .obj file, or builtin:NAME[?key=value&…]
+    #[arg(default_value = DEFAULT_SCENE)]
+    pub scene: String,
+    /// Technique, by its id (see `afterlight techniques`)
+    #[arg(long, value_name = "ID")]
+    pub technique: String,
+    /// Image: .png (tone-mapped sRGB) or .exr (linear)
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+    /// Write the frame's figures as JSON
+    #[arg(long, value_name = "FILE.json")]
+    pub stats: Option<PathBuf>,
+    #[command(flatten)]
+    pub common: CommonArgs,
+}
+
+/// Arguments of `compare`.
+#[derive(Debug, Args)]
+pub struct CompareArgs {
+    /// A .gltf, .glb or .obj file, or builtin:NAME[?key=value&…]
+    #[arg(default_value = DEFAULT_SCENE)]
+    pub scene: String,
+    /// Techniques, by their ids, or all
+    #[arg(long, value_name = "ID,ID…|all", value_delimiter = ',', default_value = "all")]
+    pub techniques: Vec<String>,
+    /// Technique that images are compared to
+    #[arg(long, value_name = "ID", default_value = "forward")]
+    pub reference: String,
+    /// Frames measured of each technique, after a warm-up frame
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub frames: u32,
+    /// Write an HTML report (report.html) and its figures (report.json) into DIR
+    #[arg(long, value_name = "DIR")]
+    pub report: Option<PathBuf>,
+    #[command(flatten)]
+    pub json: JsonArgs,
+    #[command(flatten)]
+    pub common: CommonArgs,
+}
+
+/// Arguments of `bench`.
+#[derive(Debug, Args)]
+pub struct BenchArgs {
+    /// Experiment: speed (start-up, memory and frame times), or all
+    #[arg(value_name = "EXPERIMENT|all")]
+    pub experiment: String,
+    /// Scenes
+    #[arg(long, value_name = "SCENE,SCENE…", value_delimiter = ',', default_value = DEFAULT_SCENE)]
+    pub scenes: Vec<String>,
+    /// Numbers of seeded lights
+    #[arg(long, value_name = "N,N…", value_delimiter = ',', default_value = "100,1000", value_parser = clap::value_parser!(u32).range(0..=LIGHTS_MAX))]
+    pub light_counts: Vec<u32>,
+    /// Techniques, by their ids, or all
+    #[arg(long, value_name = "ID,ID…|all", value_delimiter = ',', default_value = "all")]
+    pub techniques: Vec<String>,
+    /// Frames measured of each technique, after a warm-up frame
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub frames: u32,
+    /// Write an HTML report (report.html) and its figures (report.json) into DIR
+    #[arg(long, value_name = "DIR")]
+    pub report: Option<PathBuf>,
+    #[command(flatten)]
+    pub json: JsonArgs,
+    #[command(flatten)]
+    pub common: CommonArgs,
+}
+
+/// Arguments of `completions`.
+#[derive(Debug, Args)]
+pub struct CompletionsArgs {
+    /// The shell
+    pub shell: clap_complete::Shell,
+}
+
+/// Options of every command that renders.
+#[derive(Clone, Debug, Args)]
+pub struct CommonArgs {
+    /// Image width, pixels
+    #[arg(long, value_name = "W", default_value_t = 1280, value_parser = clap::value_parser!(u32).range(1..))]
+    pub width: u32,
+    /// Image height, pixels
+    #[arg(long, value_name = "H", default_value_t = 720, value_parser = clap::value_parser!(u32).range(1..))]
+    pub height: u32,
+    /// Samples a pixel
+    #[arg(long, value_name = "1|2|4|8|16", default_value = "1", value_parser = samples)]
+    pub samples: u32,
+    /// Number of seeded point lights; 0 keeps the scene's own lights
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=LIGHTS_MAX))]
+    pub lights: u32,
+    /// Seed of the lights
+    #[arg(long, value_name = "SEED", default_value_t = 1)]
+    pub light_seed: u64,
+    /// Camera of the scene by name or index, or eye, target and vertical angle of view
+    #[arg(long, value_name = "NAME|INDEX|x,y,z,tx,ty,tz,fov_deg", allow_hyphen_values = true)]
+    pub camera: Option<String>,
+    /// A technique's parameter; ID.KEY=VALUE for one technique alone
+    #[arg(long, value_name = "[ID.]KEY=VALUE")]
+    pub set: Vec<String>,
+    /// Device, by a part of its name or its index (see `afterlight devices`)
+    #[arg(long, value_name = "NAME|INDEX")]
+    pub device: Option<String>,
+    /// Time at which animated nodes are posed, seconds
+    #[arg(long, value_name = "SECONDS", value_parser = finite)]
+    pub time: Option<f64>,
+    /// Anti-aliasing after shading
+    #[arg(long, value_enum, default_value_t = Post::None)]
+    pub post: Post,
+    /// Shadows
+    #[arg(long, value_enum, default_value_t = Shadows::None)]
+    pub shadows: Shadows,
+    /// Width and height of a shadow map, texels
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub shadow_map_size: Option<u32>,
+    /// Indirect light
+    #[arg(long, value_enum, default_value_t = Indirect::None)]
+    pub indirect: Indirect,
+    /// What to show: the final image, or a debug view
+    #[arg(long, value_name = "final|NAME", default_value = "final")]
+    pub view: String,
+    /// Turn on Vulkan validation; any message makes the exit code 3
+    #[arg(long)]
+    pub validate: bool,
+    /// No progress bars and no tables
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+/// `--post`
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Post {
+    None,
+    Fxaa,
+    Smaa,
+    Sraa,
+}
+
+/// `--shadows`
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Shadows {
+    None,
+    Map,
+    Pcss,
+}
+
+/// `--indirect`
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Indirect {
+    None,
+    Rsm,
+}
+
+impl CommonArgs {
+    /// Refuses what this version does not have yet.
+    pub fn check(&self) -> Result<(), Failure> {
+        let not_yet = |name: &str, found: &str, expected: &str| {
+            Err(Failure::option(name, found, format!("{expected} (nothing else is available in this version)")))
+        };
+        if self.post != Post::None {
+            return not_yet("--post", &name_of(self.post), "none");
+        }
+        if self.shadows != Shadows::None {
+            return not_yet("--shadows", &name_of(self.shadows), "none");
+        }
+        if let Some(size) = self.shadow_map_size {
+            return not_yet("--shadow-map-size", &size.to_string(), "no such option without --shadows");
+        }
+        if self.indirect != Indirect::None {
+            return not_yet("--indirect", &name_of(self.indirect), "none");
+        }
+        if self.view != "final" {
+            return not_yet("--view", &format!("{:?}", self.view), "final");
+        }
+        Ok(())
+    }
+}
+
+fn name_of(value: impl ValueEnum) -> String {
+    value.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
+}
+
+fn samples(text: &str) -> Result<u32, String> {
+    match text.parse() {
+        Ok(samples @ (1 | 2 | 4 | 8 | 16)) => Ok(samples),
+        _ => Err("expected 1, 2, 4, 8 or 16".to_owned()),
+    }
+}
+
+fn finite(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if number.is_finite() => Ok(number),
+        _ => Err("expected a finite number of seconds".to_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory as _;
+
+    #[test]
+    fn command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    fn compare(arguments: &[&str]) -> CompareArgs {
+        let all = ["afterlight", "compare"].iter().chain(arguments);
+        match Cli::try_parse_from(all).expect("parses").command {
+            Command::Compare(args) => args,
+            other => panic!("expected compare, found {other:?}"),
+        }
+    }
+
+    #[test]
+    fn json_takes_a_file_a_dash_or_nothing() {
+        assert!(!compare(&[]).json.on_stdout());
+        assert!(compare(&["--json"]).json.on_stdout());
+        assert!(compare(&["--json", "-"]).json.on_stdout());
+        assert!(compare(&["--json", "--quiet"]).json.on_stdout());
+        assert_eq!(compare(&["--json", "a.json"]).json.json, Some("a.json".into()));
+    }
+
+    #[test]
+    fn json_does_not_swallow_a_scene() {
+        for scene in ["builtin:spheres", "a.gltf", "b.GLB", "c.obj"] {
+            assert!(compare(&["--json", scene]).json.check().is_err(), "{scene}");
+        }
+        assert!(compare(&["a.gltf", "--json", "-"]).json.check().is_ok());
+    }
+
+    #[test]
+    fn what_is_not_there_yet_is_refused() {
+        for option in [
+            ["--post", "fxaa"],
+            ["--shadows", "map"],
+            ["--indirect", "rsm"],
+            ["--view", "normals"],
+            ["--shadow-map-size", "512"],
+        ] {
+            let failure = compare(&option).common.check().expect_err("is refused");
+            let line = failure.lines().remove(0);
+            assert_eq!(failure.code(), 2);
+            assert!(line.starts_with(option[0]) && line.contains("expected"), "{line}");
+        }
+        assert!(compare(&["--camera", "-1,0,0,0,0,0,60"]).common.check().is_ok());
+    }
+}
