@@ -24,15 +24,15 @@ pub(crate) fn file_name(uuid: &[u8; 16]) -> String {
 pub(crate) fn unwrap<'a>(file: &'a [u8], info: &DeviceInfo) -> Option<&'a [u8]> {
     let (prefix, data) = file.split_at_checked(PREFIX_BYTES)?;
     let word = |at: usize| prefix[at..at + 8].try_into().map(u64::from_le_bytes).ok();
-    let intact = prefix[..8] == MAGIC && word(16)? == data.len() as u64 && word(8)? == checksum(data);
+    let intact = prefix[..8] == MAGIC && word(16)? == data.len() as u64 && word(8)? == checksum(data, info);
     (intact && is_of_device(data, info)).then_some(data)
 }
 
 /// A cache file with the driver's `data`.
-pub(crate) fn wrap(data: &[u8]) -> Vec<u8> {
+pub(crate) fn wrap(data: &[u8], info: &DeviceInfo) -> Vec<u8> {
     let mut file = Vec::with_capacity(PREFIX_BYTES + data.len());
     file.extend_from_slice(&MAGIC);
-    file.extend_from_slice(&checksum(data).to_le_bytes());
+    file.extend_from_slice(&checksum(data, info).to_le_bytes());
     file.extend_from_slice(&(data.len() as u64).to_le_bytes());
     file.extend_from_slice(data);
     file
@@ -66,10 +66,11 @@ fn is_of_device(data: &[u8], info: &DeviceInfo) -> bool {
         && header[16..32] == info.pipeline_cache_uuid
 }
 
-/// FNV-1a, 64 bits. Source: Fowler, Noll, Vo.
-fn checksum(data: &[u8]) -> u64 {
-    data.iter()
-        .fold(0xcbf2_9ce4_8422_2325, |hash, &byte| (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3))
+/// FNV-1a, 64 bits, over the driver's version and the data: Mesa 22.3 gives every build of lavapipe the same UUID.
+/// Source: Fowler, Noll, Vo.
+fn checksum(data: &[u8], info: &DeviceInfo) -> u64 {
+    let bytes = info.driver.as_bytes().iter().chain(data);
+    bytes.fold(0xcbf2_9ce4_8422_2325, |hash, &byte| (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3))
 }
 
 #[cfg(test)]
@@ -102,12 +103,12 @@ mod tests {
     #[test]
     fn round_trip() {
         let data = driver_data();
-        assert_eq!(unwrap(&wrap(&data), &info()), Some(&data[..]));
+        assert_eq!(unwrap(&wrap(&data, &info()), &info()), Some(&data[..]));
     }
 
     #[test]
     fn damage_anywhere_is_noticed() {
-        let file = wrap(&driver_data());
+        let file = wrap(&driver_data(), &info());
         for at in 0..file.len() {
             let mut damaged = file.clone();
             damaged[at] ^= 0x40;
@@ -117,8 +118,9 @@ mod tests {
     }
 
     #[test]
-    fn another_device_is_refused() {
-        let other = DeviceInfo { pipeline_cache_uuid: [4; 16], ..info() };
-        assert!(unwrap(&wrap(&driver_data()), &other).is_none());
+    fn another_device_or_driver_is_refused() {
+        let file = wrap(&driver_data(), &info());
+        assert!(unwrap(&file, &DeviceInfo { pipeline_cache_uuid: [4; 16], ..info() }).is_none());
+        assert!(unwrap(&file, &DeviceInfo { driver: "next".to_owned(), ..info() }).is_none());
     }
 }

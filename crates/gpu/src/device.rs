@@ -24,6 +24,9 @@ pub struct DeviceOptions {
     pub pipeline_cache_dir: Option<PathBuf>,
 }
 
+/// A device of the list: what it is, what it can do, and what it lacks that the workbench needs.
+pub type Listed = (DeviceInfo, Features, Vec<&'static str>);
+
 /// An open device. Cloning is cheap; the device closes when the last clone and the last resource of it are gone.
 #[derive(Clone)]
 pub struct Device(pub(crate) Arc<DeviceInner>);
@@ -66,7 +69,7 @@ impl Device {
     ///
     /// # Errors
     /// [`GpuError::NoLoader`] without a Vulkan loader. No device at all is an empty list.
-    pub fn enumerate() -> Result<Vec<(DeviceInfo, Features, Vec<&'static str>)>, GpuError> {
+    pub fn enumerate() -> Result<Vec<Listed>, GpuError> {
         let devices = match Instance::new(false) {
             Ok(instance) => instance.devices()?,
             Err(GpuError::NoDevice { .. }) => return Ok(Vec::new()),

@@ -625,7 +625,7 @@ impl Encoder {
         }
         let pipeline = &self.bound().inner;
         assert!(
-            data.len() <= pipeline.push_constant_bytes as usize && data.len() % 4 == 0,
+            data.len() <= pipeline.push_constant_bytes as usize && data.len().is_multiple_of(4),
             "{}: {} bytes of push constants, the pipeline has {}",
             self.bound().name(),
             data.len(),
@@ -938,7 +938,11 @@ impl Encoder {
         bytes: u64,
         value: u32,
     ) -> Result<(), GpuError> {
-        assert!(offset % 4 == 0 && bytes % 4 == 0, "{}: fill of {bytes} bytes at {offset}", buffer.name());
+        assert!(
+            offset.is_multiple_of(4) && bytes.is_multiple_of(4),
+            "{}: fill of {bytes} bytes at {offset}",
+            buffer.name()
+        );
         buffer.check_range(offset, bytes)?;
         if bytes > 0 {
             // SAFETY: as in `barriers`; the range has been checked.
@@ -954,7 +958,7 @@ impl Encoder {
     /// [`GpuError::OutOfRange`] with the buffer's name; [`GpuError::TooLarge`].
     pub fn update_buffer(&mut self, buffer: &Buffer, offset: u64, data: &[u8]) -> Result<(), GpuError> {
         assert!(
-            offset % 4 == 0 && data.len() % 4 == 0,
+            offset.is_multiple_of(4) && data.len().is_multiple_of(4),
             "{}: update of {} bytes at {offset}",
             buffer.name(),
             data.len()

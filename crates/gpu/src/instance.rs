@@ -83,14 +83,26 @@ impl Instance {
                 reason: "the installed loader knows Vulkan 1.0 alone".to_owned(),
             });
         }
-        let has_debug_utils = validate || has_instance_extension(entry, ext::debug_utils::NAME);
+        if validate {
+            require_validation_layer(entry)?;
+        }
+        // Asking the loader which extensions there are makes it load and unload every driver, 50 ms with lavapipe; so
+        // debug names and labels, which every loader since 2018 has, are asked for outright.
+        match Instance::create(entry, validate, true) {
+            Err(GpuError::Vulkan { result: vk::Result::ERROR_EXTENSION_NOT_PRESENT, .. }) if !validate => {
+                Instance::create(entry, validate, false)
+            }
+            created => created,
+        }
+    }
+
+    fn create(entry: &ash::Entry, validate: bool, has_debug_utils: bool) -> Result<Instance, GpuError> {
         let mut layers = Vec::new();
         let mut extensions = Vec::new();
         if has_debug_utils {
             extensions.push(ext::debug_utils::NAME.as_ptr());
         }
         if validate {
-            require_validation_layer(entry)?;
             layers.push(VALIDATION_LAYER.as_ptr());
             extensions.push(ext::validation_features::NAME.as_ptr());
         }
@@ -153,12 +165,6 @@ impl Drop for Instance {
             self.raw.destroy_instance(None);
         }
     }
-}
-
-fn has_instance_extension(entry: &ash::Entry, name: &CStr) -> bool {
-    // SAFETY: the loader is open.
-    let listed = unsafe { entry.enumerate_instance_extension_properties(None) }.unwrap_or_default();
-    listed.iter().any(|e| e.extension_name_as_c_str() == Ok(name))
 }
 
 fn require_validation_layer(entry: &ash::Entry) -> Result<(), GpuError> {

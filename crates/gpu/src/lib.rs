@@ -32,7 +32,7 @@ mod upload;
 pub use ash::vk;
 
 pub use descriptor::{DescriptorSet, PushSet, SetLayoutDesc, SlotLayout, SlotResource, SlotWrite};
-pub use device::{Device, DeviceOptions};
+pub use device::{Device, DeviceOptions, Listed};
 pub use encoder::{
     Access, BufferBarrier, ClearColor, ColorAttachment, Completed, DepthAttachment, Encoder, ImageBarrier,
     Load, MemoryBarrier, Rendering, Resolve, Statistics, StatisticsId, StencilAttachment, TimestampId,

@@ -103,7 +103,7 @@ impl Heap {
         offset: u64,
     ) -> Result<(), GpuError> {
         assert!(
-            offset % needs.alignment == 0,
+            offset.is_multiple_of(needs.alignment),
             "{resource}: offset {offset} in heap {} is no multiple of {}",
             self.0.name,
             needs.alignment
@@ -354,7 +354,7 @@ impl Device {
     /// [`GpuError::OutOfMemory`], [`GpuError::TooLarge`] with the heap's name.
     pub fn create_heap(&self, name: &str, bytes: u64, type_bits: u32) -> Result<Heap, GpuError> {
         let bytes = bytes.max(1);
-        self.check_allocation(name, bytes)?;
+        self.check_allocation(name, bytes, MemoryKind::DeviceLocal)?;
         let Some(type_index) = self.device_local_type(type_bits) else {
             return Err(GpuError::Allocation {
                 resource: name.to_owned(),
@@ -397,7 +397,7 @@ impl Device {
         kind: MemoryKind,
         is_linear: bool,
     ) -> Result<Allocation, GpuError> {
-        self.check_allocation(name, needs.size)?;
+        self.check_allocation(name, needs.size, kind)?;
         let desc = AllocationCreateDesc {
             name,
             requirements: needs,
@@ -426,9 +426,15 @@ impl Device {
     }
 
     /// Refuses what cannot fit before a driver is asked: some overcommit and fail at the first touch.
-    fn check_allocation(&self, name: &str, bytes: u64) -> Result<(), GpuError> {
+    fn check_allocation(&self, name: &str, bytes: u64, kind: MemoryKind) -> Result<(), GpuError> {
         let features = self.features();
-        if bytes > features.device_local_heap_bytes {
+        let room = match kind {
+            MemoryKind::DeviceLocal => features.device_local_heap_bytes,
+            MemoryKind::Upload | MemoryKind::Readback => {
+                self.0.memory.memory_heaps_as_slice().iter().map(|h| h.size).max().unwrap_or(0)
+            }
+        };
+        if bytes > room {
             return Err(GpuError::OutOfMemory { resource: name.to_owned(), bytes });
         }
         check_limit(name, "bytes of one allocation", bytes, features.max_allocation_bytes)

@@ -308,7 +308,7 @@ impl PipelineStore {
         // SAFETY: the cache is one of this device's; the driver locks it.
         let data = unsafe { device.get_pipeline_cache_data(self.driver_cache) }
             .map_err(GpuError::call("vkGetPipelineCacheData"))?;
-        let file = cache::wrap(&data);
+        let file = cache::wrap(&data, info);
         debug_assert!(
             cache::unwrap(&file, info).is_some(),
             "the driver's own header differs from its properties"
