@@ -1,0 +1,418 @@
+//! Choice of a camera, a camera made to fit, and camera paths.
+
+use std::path::Path;
+
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use crate::{Aabb, Camera, Instance, Scene, SceneError};
+
+/// Near plane of a camera given by numbers, and the farthest of one made to fit, metres.
+const NEAR_MAX_M: f32 = 0.1;
+/// Extent of a scene over the near plane of a camera made to fit. Depth is reversed and in floating
+/// point, so the ratio costs no precision; a greater near plane would cut what stands before the eye.
+const EXTENT_PER_NEAR: f32 = 10_000.0;
+/// Vertical angle of view of a camera inside a scene, degrees.
+const INTERIOR_FOV_DEG: f32 = 60.0;
+/// Vertical angle of view of a camera before a scene, degrees.
+const EXTERIOR_FOV_DEG: f32 = 45.0;
+/// Height of a standing person's eye, metres.
+const EYE_HEIGHT_M: f32 = 1.7;
+/// Most triangles whose solid angle is summed to tell an interior from an object.
+const SOLID_ANGLE_TRIANGLES_MAX: u64 = 200_000;
+
+/// The camera that `--camera` asks for: a name, an index into [`Scene::cameras`], or
+/// `x,y,z,tx,ty,tz,fov_deg` (eye, target, vertical angle of view in degrees; near plane 0.1 m).
+/// Without a request the scene's first camera, or [`default_camera`] where it has none.
+///
+/// # Errors
+/// [`SceneError::BadParameter`] lists the cameras that exist.
+pub fn select(scene: &Scene, spec: Option<&str>) -> Result<Camera, SceneError> {
+    let Some(spec) = spec else {
+        return Ok(scene.cameras.first().cloned().unwrap_or_else(|| default_camera(scene)));
+    };
+    if let Some(camera) = scene.cameras.iter().find(|c| c.name == spec) {
+        return Ok(camera.clone());
+    }
+    if let Some(camera) = spec.parse().ok().and_then(|index: usize| scene.cameras.get(index)) {
+        return Ok(camera.clone());
+    }
+    from_numbers(spec).ok_or_else(|| SceneError::BadParameter {
+        name: "--camera".to_owned(),
+        found: format!("'{}'", crate::error::one_line(spec)),
+        expected: format!(
+            "{}, or x,y,z,tx,ty,tz,fov_deg with fov_deg between 0 and 180 and a target off the eye",
+            known_cameras(scene)
+        ),
+    })
+}
+
+/// Names and indices that [`select`] takes.
+fn known_cameras(scene: &Scene) -> String {
+    /// Cameras listed by name in a message.
+    const LISTED_MAX: usize = 16;
+    if scene.cameras.is_empty() {
+        return "a camera (this scene has none)".to_owned();
+    }
+    let mut names: Vec<_> = scene
+        .cameras
+        .iter()
+        .take(LISTED_MAX)
+        .enumerate()
+        .map(|(i, c)| format!("{i} '{}'", crate::error::one_line(&c.name)))
+        .collect();
+    if scene.cameras.len() > LISTED_MAX {
+        names.push(format!("up to {}", scene.cameras.len() - 1));
+    }
+    format!("one of {}", names.join(", "))
+}
+
+/// A camera of seven numbers with commas between.
+fn from_numbers(spec: &str) -> Option<Camera> {
+    let numbers: Vec<f32> = spec.split(',').map(|n| n.trim().parse().ok()).collect::<Option<_>>()?;
+    let &[x, y, z, tx, ty, tz, fov_deg] = numbers.as_slice() else { return None };
+    let (eye_ws, target_ws) = (Vec3::new(x, y, z), Vec3::new(tx, ty, tz));
+    let looks = (target_ws - eye_ws).try_normalize().is_some();
+    let sound = eye_ws.is_finite() && looks && fov_deg > 0.0 && fov_deg < 180.0;
+    sound.then(|| Camera::look_at("command line", eye_ws, target_ws, fov_deg.to_radians(), NEAR_MAX_M))
+}
+
+/// A camera made to fit the scene.
+///
+/// The signed solid angles of the triangles, seen from the centre of the bounds, tell what the scene is: where
+/// front faces (double-sided ones count half as front, half as back) cover clearly more than back
+/// faces and more than half the sphere, it is an interior. Then the eye stands inside near one end
+/// of the longest horizontal axis, before what blocks the view from the centre, a fifth of the height up
+/// (1.7 m where the scene is higher than that and a fifth is less), and looks along the axis. Else
+/// the bounding sphere is framed from the front (+Z in glTF), slightly from above.
+pub fn default_camera(scene: &Scene) -> Camera {
+    let bounds_ws = scene.bounds_ws();
+    let extent_m = bounds_ws.size().max_element();
+    if !(extent_m.is_finite() && extent_m > 0.0 && bounds_ws.center().is_finite()) {
+        return Camera::look_at(
+            "default",
+            Vec3::new(0.0, 0.0, 3.0),
+            Vec3::ZERO,
+            EXTERIOR_FOV_DEG.to_radians(),
+            NEAR_MAX_M,
+        );
+    }
+    let near_m = (extent_m / EXTENT_PER_NEAR).min(NEAR_MAX_M);
+    if is_interior(scene, bounds_ws.center()) {
+        interior_camera(scene, &bounds_ws, near_m)
+    } else {
+        exterior_camera(&bounds_ws, near_m)
+    }
+}
+
+/// Frames the bounding sphere from the front, slightly from above.
+fn exterior_camera(bounds_ws: &Aabb, near_m: f32) -> Camera {
+    let fov_y_rad = EXTERIOR_FOV_DEG.to_radians();
+    let radius_m = 0.5 * bounds_ws.size().length();
+    let distance_m = 1.02 * radius_m / (0.5 * fov_y_rad).sin();
+    let eye_ws = bounds_ws.center() + distance_m * Vec3::new(0.0, 0.26, 1.0).normalize();
+    Camera::look_at("default", eye_ws, bounds_ws.center(), fov_y_rad, near_m)
+}
+
+/// Stands near one end of the longest horizontal axis and looks along it.
+fn interior_camera(scene: &Scene, bounds_ws: &Aabb, near_m: f32) -> Camera {
+    let size_m = bounds_ws.size();
+    let axis_ws = if size_m.x >= size_m.z { Vec3::X } else { Vec3::Z };
+    let half_m = 0.5 * size_m.dot(axis_ws);
+    let mut height_m = 0.2 * size_m.y;
+    if size_m.y > EYE_HEIGHT_M {
+        height_m = height_m.max(EYE_HEIGHT_M).min(0.9 * size_m.y);
+    }
+    let mut center_ws = bounds_ws.center();
+    center_ws.y = bounds_ws.min.y + height_m;
+    // 0.9: an eye at the very wall sees it cut by the near plane when the view turns
+    let free_m = [axis_ws, -axis_ws].map(|d| 0.9 * first_hit_m(scene, center_ws, d).min(half_m));
+    let (back_ws, back_m) = if free_m[0] > free_m[1] { (axis_ws, free_m[0]) } else { (-axis_ws, free_m[1]) };
+    let eye_ws = center_ws + back_m * back_ws;
+    Camera::look_at("default", eye_ws, eye_ws - back_ws, INTERIOR_FOV_DEG.to_radians(), near_m)
+}
+
+/// Whether front faces surround a point.
+fn is_interior(scene: &Scene, point_ws: Vec3) -> bool {
+    let total = scene.triangle_count();
+    // odd, so that quads split in two triangles are not seen by one half alone
+    let stride = (total.div_ceil(SOLID_ANGLE_TRIANGLES_MAX) | 1) as usize;
+    let (mut front_sr, mut back_sr, mut skip) = (0.0, 0.0, 0);
+    for instance in &scene.instances {
+        let material = scene.materials.get(scene.meshes[instance.mesh as usize].material as usize);
+        let double_sided = material.is_some_and(|m| m.double_sided);
+        let triangle_count = scene.meshes[instance.mesh as usize].index_count as usize / 3;
+        while skip < triangle_count {
+            let corners = world_triangle(scene, instance, skip);
+            let solid_sr = signed_solid_angle_sr(corners, point_ws) * stride as f64;
+            if double_sided {
+                front_sr += 0.5 * solid_sr.abs();
+                back_sr += 0.5 * solid_sr.abs();
+            } else {
+                *(if solid_sr > 0.0 { &mut front_sr } else { &mut back_sr }) += solid_sr.abs();
+            }
+            skip += stride;
+        }
+        skip -= triangle_count;
+    }
+    // one tenth: rounding, and the error of taking every n-th triangle
+    front_sr > 1.1 * back_sr && front_sr > 2.0 * std::f64::consts::PI
+}
+
+/// Corners of a triangle of an instance, counter-clockwise from its front whatever the instance mirrors.
+fn world_triangle(scene: &Scene, instance: &Instance, triangle: usize) -> [Vec3; 3] {
+    let mesh = &scene.meshes[instance.mesh as usize];
+    let first = mesh.first_index as usize + 3 * triangle;
+    let corner = |k: usize| {
+        let vertex = mesh.first_vertex as usize + scene.indices[first + k] as usize;
+        instance.world_from_object.transform_point3(Vec3::from_array(scene.positions_os[vertex]))
+    };
+    let mirrored = instance.world_from_object.matrix3.determinant() < 0.0;
+    if mirrored { [corner(0), corner(2), corner(1)] } else { [corner(0), corner(1), corner(2)] }
+}
+
+/// Solid angle of a triangle seen from a point, positive where its front is seen (Van Oosterom, Strackee 1983).
+fn signed_solid_angle_sr(corners_ws: [Vec3; 3], point_ws: Vec3) -> f64 {
+    let [a, b, c] = corners_ws.map(|p| (p - point_ws).as_dvec3());
+    let (la, lb, lc) = (a.length(), b.length(), c.length());
+    let denominator = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
+    let angle = -2.0 * a.dot(b.cross(c)).atan2(denominator);
+    if angle.is_finite() { angle } else { 0.0 }
+}
+
+/// Distance to the first triangle along a unit direction, metres; infinite where there is none.
+fn first_hit_m(scene: &Scene, origin_ws: Vec3, direction_ws: Vec3) -> f32 {
+    let hit = |instance: &Instance| {
+        let mesh = &scene.meshes[instance.mesh as usize];
+        let object_from_world = instance.world_from_object.inverse();
+        let origin_os = object_from_world.transform_point3(origin_ws);
+        let direction_os = object_from_world.transform_vector3(direction_ws);
+        if !origin_os.is_finite() || !hits_box(&mesh.bounds_os, origin_os, direction_os) {
+            return f32::INFINITY;
+        }
+        let first = mesh.first_index as usize;
+        scene.indices[first..first + mesh.index_count as usize]
+            .par_chunks_exact(3)
+            .with_min_len(1 << 14)
+            .map(|triangle| {
+                let [a, b, c] = [0, 1, 2].map(|k| {
+                    Vec3::from_array(scene.positions_os[(mesh.first_vertex + triangle[k]) as usize])
+                });
+                hit_triangle([a, b, c], origin_os, direction_os)
+            })
+            .reduce(|| f32::INFINITY, f32::min)
+    };
+    scene.instances.iter().map(hit).fold(f32::INFINITY, f32::min)
+}
+
+/// Whether a ray meets a box.
+fn hits_box(bounds: &Aabb, origin: Vec3, direction: Vec3) -> bool {
+    let inverse = direction.recip();
+    let (t0, t1) = ((bounds.min - origin) * inverse, (bounds.max - origin) * inverse);
+    // a direction with a zero gives NaN only for an origin in the face's plane: min and max drop it
+    let enter = t0.min(t1).max_element().max(0.0);
+    !(enter > t0.max(t1).min_element())
+}
+
+/// Parameter of the hit of a ray with a triangle, from either side (Möller, Trumbore 1997).
+fn hit_triangle([a, b, c]: [Vec3; 3], origin: Vec3, direction: Vec3) -> f32 {
+    let (ab, ac) = (b - a, c - a);
+    let p = direction.cross(ac);
+    let inverse = 1.0 / ab.dot(p);
+    let u = (origin - a).dot(p) * inverse;
+    let q = (origin - a).cross(ab);
+    let v = direction.dot(q) * inverse;
+    let t = ac.dot(q) * inverse;
+    if u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 0.0 { t } else { f32::INFINITY }
+}
+
+/// A place on a camera path.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Keyframe {
+    /// Position of the eye, world space, metres.
+    pub eye_ws: [f32; 3],
+    /// Point that is looked at, world space, metres.
+    pub target_ws: [f32; 3],
+    /// Vertical angle of view, degrees, between 0 and 180.
+    pub fov_deg: f32,
+}
+
+/// A camera path: a Catmull-Rom spline through keyframes at even times.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CameraPath {
+    /// Name for reports.
+    pub name: String,
+    /// Near plane, metres.
+    #[serde(default = "default_near_m")]
+    pub near_m: f32,
+    /// Whether the path returns from the last keyframe to the first.
+    #[serde(default)]
+    pub closed: bool,
+    /// The keyframes, at least one.
+    pub keyframes: Vec<Keyframe>,
+}
+
+fn default_near_m() -> f32 {
+    NEAR_MAX_M
+}
+
+impl CameraPath {
+    /// Reads a path from a JSON file.
+    ///
+    /// # Errors
+    /// [`SceneError::Io`] where the file cannot be read, [`SceneError::Invalid`] where it is no path.
+    pub fn load(file: &Path) -> Result<Self, SceneError> {
+        let text = std::fs::read_to_string(file).map_err(|e| SceneError::io(file, &e))?;
+        Self::from_json(&text, file)
+    }
+
+    /// Reads a path from JSON; `file` is named in errors.
+    ///
+    /// # Errors
+    /// [`SceneError::Invalid`] where the text is no path.
+    pub fn from_json(text: &str, file: &Path) -> Result<Self, SceneError> {
+        let path: Self = serde_json::from_str(text).map_err(|e| {
+            SceneError::invalid(
+                file,
+                "camera path",
+                e.to_string(),
+                "keyframes with eye_ws, target_ws, fov_deg",
+            )
+        })?;
+        path.check(file)?;
+        Ok(path)
+    }
+
+    fn check(&self, file: &Path) -> Result<(), SceneError> {
+        if self.keyframes.is_empty() {
+            return Err(SceneError::invalid(file, "keyframes", "none", "at least one"));
+        }
+        if !(self.near_m > 0.0 && self.near_m.is_finite()) {
+            return Err(SceneError::invalid(file, "near_m", self.near_m.to_string(), "a positive number"));
+        }
+        for (i, k) in self.keyframes.iter().enumerate() {
+            if !(k.fov_deg > 0.0 && k.fov_deg < 180.0) {
+                let at = format!("keyframes[{i}].fov_deg");
+                return Err(SceneError::invalid(
+                    file,
+                    at,
+                    k.fov_deg.to_string(),
+                    "degrees between 0 and 180",
+                ));
+            }
+            if !k.eye_ws.iter().chain(&k.target_ws).all(|v| v.is_finite()) {
+                return Err(SceneError::invalid(
+                    file,
+                    format!("keyframes[{i}]"),
+                    "a number out of range",
+                    "finite numbers",
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// A fly-through of any scene, from its bounds alone: for an interior there and back along its
+    /// longest axis at changing heights, else around its bounding sphere.
+    pub fn fly_through(scene: &Scene) -> Self {
+        let camera = default_camera(scene);
+        let near_m = camera.clip_near_m();
+        let bounds_ws = scene.bounds_ws();
+        let (center_ws, size_m) = (bounds_ws.center(), bounds_ws.size());
+        let sound = center_ws.is_finite() && size_m.is_finite() && size_m.max_element() > 0.0;
+        let eye_ws = camera.eye_ws();
+        let inside = sound && eye_ws.cmpge(bounds_ws.min).all() && eye_ws.cmple(bounds_ws.max).all();
+        let keyframes = if inside { walk(&bounds_ws, eye_ws) } else { orbit(center_ws, eye_ws) };
+        Self { name: "fly-through".to_owned(), near_m, closed: true, keyframes }
+    }
+
+    /// The camera at `t` in [0, 1], clamped: 0 is the first keyframe, 1 the last (the first again where closed).
+    pub fn at(&self, t: f32) -> Camera {
+        let count = self.keyframes.len();
+        let t = if t.is_finite() { t.clamp(0.0, 1.0) } else { 0.0 };
+        if count == 0 {
+            return Camera::look_at(
+                &self.name,
+                Vec3::ZERO,
+                Vec3::NEG_Z,
+                EXTERIOR_FOV_DEG.to_radians(),
+                self.near_m,
+            );
+        }
+        let spans = if self.closed { count } else { count - 1 };
+        let place = t * spans as f32;
+        let span = (place as usize).min(spans.saturating_sub(1));
+        let at = |offset: isize| {
+            let i = span as isize + offset;
+            let i = if self.closed { i.rem_euclid(count as isize) } else { i.clamp(0, count as isize - 1) };
+            &self.keyframes[i as usize]
+        };
+        let keys = [at(-1), at(0), at(1), at(2)];
+        let u = place - span as f32;
+        let eye_ws = catmull_rom(keys.map(|k| Vec3::from_array(k.eye_ws)), u);
+        let target_ws = catmull_rom(keys.map(|k| Vec3::from_array(k.target_ws)), u);
+        let fov_deg = keys[1].fov_deg + (keys[2].fov_deg - keys[1].fov_deg) * u;
+        Camera::look_at(&self.name, eye_ws, target_ws, fov_deg.to_radians(), self.near_m)
+    }
+}
+
+impl Camera {
+    /// Distance of the near plane, metres.
+    pub fn clip_near_m(&self) -> f32 {
+        match self.projection {
+            crate::Projection::Perspective { near_m, .. }
+            | crate::Projection::Orthographic { near_m, .. } => near_m,
+        }
+    }
+}
+
+/// There and back between the eye and its mirror image at the centre, within the middle of the cross-section.
+fn walk(bounds_ws: &Aabb, eye_ws: Vec3) -> Vec<Keyframe> {
+    let center_ws = bounds_ws.center();
+    let along_ws = Vec3::new(center_ws.x - eye_ws.x, 0.0, center_ws.z - eye_ws.z);
+    let side_ws = along_ws.cross(Vec3::Y).normalize_or_zero() * 0.08 * bounds_ws.size().min_element();
+    let rise_ws = Vec3::Y * (0.25 * bounds_ws.size().y).min(0.5 * (bounds_ws.max.y - eye_ws.y).max(0.0));
+    let place = |a: f32, side: f32, rise: f32| eye_ws + along_ws * a + side_ws * side + rise_ws * rise;
+    let key = |eye: Vec3, target: Vec3| Keyframe {
+        eye_ws: eye.into(),
+        target_ws: target.into(),
+        fov_deg: INTERIOR_FOV_DEG,
+    };
+    vec![
+        key(place(0.1, 0.0, 0.0), place(1.1, 0.0, 0.1)),
+        key(place(0.7, 1.0, 0.2), place(1.6, -1.0, 0.3)),
+        key(place(1.3, 0.0, 0.6), place(1.9, 3.0, 0.5)),
+        key(place(1.7, -1.0, 0.8), place(1.4, -4.0, 0.4)),
+        key(place(1.3, 0.0, 0.9), place(0.5, 0.0, 0.5)),
+        key(place(0.7, 1.0, 0.4), place(0.0, 1.0, 0.2)),
+    ]
+}
+
+/// Around the centre at the eye's distance and height.
+fn orbit(center_ws: Vec3, eye_ws: Vec3) -> Vec<Keyframe> {
+    let arm = eye_ws - center_ws;
+    (0..8u8)
+        .map(|i| {
+            let turned = glam::Quat::from_rotation_y(f32::from(i) * std::f32::consts::FRAC_PI_4) * arm;
+            Keyframe {
+                eye_ws: (center_ws + turned).into(),
+                target_ws: center_ws.into(),
+                fov_deg: EXTERIOR_FOV_DEG,
+            }
+        })
+        .collect()
+}
+
+/// The uniform Catmull-Rom spline between the middle two of four points (Catmull, Rom 1974).
+fn catmull_rom(points: [Vec3; 4], u: f32) -> Vec3 {
+    let [p0, p1, p2, p3] = points.map(|p| p.as_dvec3());
+    let u = f64::from(u);
+    let sum: DVec3 = 2.0 * p1
+        + (p2 - p0) * u
+        + (2.0 * p0 - 5.0 * p1 + 4.0 * p2 - p3) * (u * u)
+        + (3.0 * (p1 - p2) + p3 - p0) * (u * u * u);
+    (0.5 * sum).as_vec3()
+}
