@@ -1,10 +1,11 @@
 //! Choosing and opening a device; what all resources share.
 
 use crate::descriptor::{SetLayoutCache, SlotLayout};
-use crate::encoder::{Completed, Encoder, Recorder};
+use crate::encoder::{Completed, Encoder};
 use crate::features::Detected;
 use crate::instance::Instance;
 use crate::pipeline::PipelineStore;
+use crate::recorder::Recorder;
 use crate::sampler::SamplerStore;
 use crate::{DeviceInfo, Features, GpuError, cache};
 use ash::{ext, khr, vk};

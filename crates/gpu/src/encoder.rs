@@ -1,16 +1,10 @@
 //! Recording commands, submitting them, and what comes back: timestamps and statistics.
 
 use crate::device::{c_name, lost};
-use crate::memory::MemoryKind;
+use crate::recorder::{CHECKPOINTS_MAX, QUERIES_PER_POOL, Recorder, query_pool, query_results};
 use crate::{Buffer, DescriptorSet, Device, GpuError, Image, ImageView, Pipeline, PushSet};
 use ash::vk;
-use gpu_allocator::vulkan::{Allocation, Allocator};
-use std::ptr::NonNull;
 
-/// Queries of a pool; more are had by more pools.
-const QUERIES_PER_POOL: u32 = 128;
-/// Labels of one submission that a lost device can name; later ones are recorded without a checkpoint.
-const CHECKPOINTS_MAX: usize = 1024;
 /// What is counted, in the order of the flags' bits, which is the order of the results.
 const STATISTICS: [vk::QueryPipelineStatisticFlags; 7] = [
     vk::QueryPipelineStatisticFlags::INPUT_ASSEMBLY_VERTICES,
@@ -233,163 +227,6 @@ impl Completed {
     }
 }
 
-/// A command pool with one command buffer, its fence, query pools and checkpoint words: what an encoder records with.
-/// It is used again after the submission is done.
-pub(crate) struct Recorder {
-    pool: vk::CommandPool,
-    pub commands: vk::CommandBuffer,
-    pub fence: vk::Fence,
-    timestamp_pools: Vec<vk::QueryPool>,
-    statistics_pools: Vec<vk::QueryPool>,
-    checkpoints: Option<Checkpoints>,
-}
-
-/// A word for each label, which the device writes when it reaches the label's end: each its own, so that no two writes
-/// need an order.
-struct Checkpoints {
-    buffer: vk::Buffer,
-    allocation: Allocation,
-    words: NonNull<u32>,
-}
-
-// SAFETY: the pointer leads to memory that is mapped as long as the allocation lives, and one thread owns the recorder.
-unsafe impl Send for Recorder {}
-
-impl Recorder {
-    pub fn new(device: &Device) -> Result<Recorder, GpuError> {
-        let raw = &device.0.raw;
-        let info = vk::CommandPoolCreateInfo::default()
-            .queue_family_index(device.0.queue_family)
-            .flags(vk::CommandPoolCreateFlags::TRANSIENT);
-        // SAFETY: the device is alive and has the queue family; so for every call of this function.
-        let pool =
-            unsafe { raw.create_command_pool(&info, None) }.map_err(GpuError::call("vkCreateCommandPool"))?;
-        let mut recorder = Recorder {
-            pool,
-            commands: vk::CommandBuffer::null(),
-            fence: vk::Fence::null(),
-            timestamp_pools: Vec::new(),
-            statistics_pools: Vec::new(),
-            checkpoints: None,
-        };
-        let info = vk::CommandBufferAllocateInfo::default()
-            .command_pool(pool)
-            .level(vk::CommandBufferLevel::PRIMARY)
-            .command_buffer_count(1);
-        // SAFETY: the pool was just made.
-        let made = unsafe { raw.allocate_command_buffers(&info) }
-            .map_err(GpuError::call("vkAllocateCommandBuffers"))
-            .and_then(|commands| {
-                recorder.commands = commands[0];
-                // SAFETY: the device is alive.
-                unsafe { raw.create_fence(&vk::FenceCreateInfo::default(), None) }
-                    .map_err(GpuError::call("vkCreateFence"))
-            })
-            .and_then(|fence| {
-                recorder.fence = fence;
-                Checkpoints::new(device)
-            });
-        match made {
-            Ok(checkpoints) => {
-                recorder.checkpoints = Some(checkpoints);
-                Ok(recorder)
-            }
-            Err(error) => {
-                // SAFETY: nothing has been submitted.
-                device.with_allocator(|a| unsafe { recorder.destroy(raw, Some(a)) });
-                Err(error)
-            }
-        }
-    }
-
-    /// Resets the pool and begins the command buffer anew.
-    pub fn begin(&mut self, device: &ash::Device) -> Result<(), GpuError> {
-        // SAFETY: the last submission of this recorder is done, so its commands and queries are free.
-        unsafe {
-            device
-                .reset_command_pool(self.pool, vk::CommandPoolResetFlags::empty())
-                .map_err(GpuError::call("vkResetCommandPool"))?;
-            for &pool in self.timestamp_pools.iter().chain(&self.statistics_pools) {
-                device.reset_query_pool(pool, 0, QUERIES_PER_POOL);
-            }
-            let info =
-                vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
-            device.begin_command_buffer(self.commands, &info).map_err(GpuError::call("vkBeginCommandBuffer"))
-        }
-    }
-
-    /// Waits for the fence of the submission and resets it.
-    pub fn wait(&self, device: &ash::Device) -> Result<(), vk::Result> {
-        // SAFETY: the fence belongs to this recorder and was submitted.
-        unsafe {
-            device.wait_for_fences(&[self.fence], true, u64::MAX)?;
-            device.reset_fences(&[self.fence])
-        }
-    }
-
-    /// # Safety
-    /// What was submitted must be done.
-    pub unsafe fn destroy(self, device: &ash::Device, allocator: Option<&mut Allocator>) {
-        // SAFETY: the caller promises that the device is done with all of it.
-        unsafe {
-            for pool in self.timestamp_pools.into_iter().chain(self.statistics_pools) {
-                device.destroy_query_pool(pool, None);
-            }
-            device.destroy_fence(self.fence, None);
-            device.destroy_command_pool(self.pool, None);
-            if let Some(checkpoints) = self.checkpoints {
-                device.destroy_buffer(checkpoints.buffer, None);
-                // It was this allocator's, which therefore takes it.
-                let _ = allocator.map(|a| a.free(checkpoints.allocation));
-            }
-        }
-    }
-}
-
-impl Checkpoints {
-    fn new(device: &Device) -> Result<Checkpoints, GpuError> {
-        const NAME: &str = "checkpoints";
-        let bytes = 4 * CHECKPOINTS_MAX as u64;
-        let info = vk::BufferCreateInfo::default().size(bytes).usage(vk::BufferUsageFlags::TRANSFER_DST);
-        let raw = &device.0.raw;
-        // SAFETY: the device is alive.
-        let buffer = unsafe { raw.create_buffer(&info, None) }.map_err(GpuError::of_resource(
-            "vkCreateBuffer",
-            NAME,
-            bytes,
-        ))?;
-        // SAFETY: the buffer was just made.
-        let needs = unsafe { raw.get_buffer_memory_requirements(buffer) };
-        let placed = device.allocate(NAME, needs, MemoryKind::Readback, true).and_then(|allocation| {
-            // SAFETY: the allocation was made for these requirements.
-            let bound = unsafe { raw.bind_buffer_memory(buffer, allocation.memory(), allocation.offset()) };
-            match (bound, allocation.mapped_ptr()) {
-                (Ok(()), Some(address)) => Ok(Checkpoints { buffer, allocation, words: address.cast() }),
-                (Ok(()), None) => Err(GpuError::NotMapped { resource: NAME.to_owned() }),
-                (Err(result), _) => Err(GpuError::Vulkan { call: "vkBindBufferMemory", result }),
-            }
-        });
-        if placed.is_err() {
-            // SAFETY: nobody else has the buffer.
-            unsafe { raw.destroy_buffer(buffer, None) };
-        }
-        placed
-    }
-
-    fn clear(&mut self, count: usize) {
-        // SAFETY: the words are mapped, `count` is at most their number, and the device is not using them.
-        unsafe { self.words.as_ptr().write_bytes(0, count.min(CHECKPOINTS_MAX)) };
-    }
-
-    /// The last of the first `count` labels that was reached.
-    fn last_reached(&self, count: usize) -> Option<usize> {
-        // SAFETY: as above; the device wrote whole words, and writes no more once it is lost.
-        (0..count.min(CHECKPOINTS_MAX))
-            .rev()
-            .find(|&i| unsafe { self.words.as_ptr().add(i).read_volatile() } != 0)
-    }
-}
-
 /// What the recorded commands use, held until they are done.
 #[allow(dead_code)] // Held for its drop alone.
 enum Kept {
@@ -412,6 +249,8 @@ pub struct Encoder {
     is_rendering: bool,
     timestamp_count: u32,
     statistics_count: u32,
+    /// The query that counts at the moment.
+    counting: Option<StatisticsId>,
     open_labels: Vec<usize>,
     labels: Vec<String>,
 }
@@ -432,6 +271,7 @@ impl Encoder {
             is_rendering: false,
             timestamp_count: 0,
             statistics_count: 0,
+            counting: None,
             open_labels: Vec::new(),
             labels: Vec::new(),
         })
@@ -1018,6 +858,8 @@ impl Encoder {
     }
 
     /// Closes the label opened last. Outside rendering a checkpoint is written, by which a lost device names the pass.
+    /// It orders nothing, so that measuring costs no overlap: where nothing else makes the device wait for the pass, the
+    /// pass named may be one that was still running.
     ///
     /// # Panics
     /// If no label is open.
@@ -1063,9 +905,10 @@ impl Encoder {
     /// A driver that has no more query pools.
     ///
     /// # Panics
-    /// Within rendering.
+    /// Within rendering, or while another query counts.
     pub fn begin_statistics(&mut self) -> Result<StatisticsId, GpuError> {
         assert!(!self.is_rendering, "statistics begin outside rendering");
+        assert!(self.counting.is_none(), "statistics begin while {:?} counts", self.counting);
         let id = StatisticsId(self.statistics_count);
         if self.device.features().pipeline_statistics {
             let recorder = self.recorder.as_mut().expect("the encoder is recording");
@@ -1083,15 +926,18 @@ impl Encoder {
             unsafe { self.raw().cmd_begin_query(self.commands, pool, id.0 % QUERIES_PER_POOL, flags) };
         }
         self.statistics_count += 1;
+        self.counting = Some(id);
         Ok(id)
     }
 
     /// Ends the counting that `id` began.
     ///
     /// # Panics
-    /// Within rendering.
+    /// Within rendering, or if another query counts.
     pub fn end_statistics(&mut self, id: StatisticsId) {
         assert!(!self.is_rendering, "statistics end outside rendering");
+        assert!(self.counting == Some(id), "{id:?} ends while {:?} counts", self.counting);
+        self.counting = None;
         if self.device.features().pipeline_statistics {
             let recorder = self.recorder.as_ref().expect("the encoder is recording");
             let pool = recorder.statistics_pools[(id.0 / QUERIES_PER_POOL) as usize];
@@ -1101,7 +947,13 @@ impl Encoder {
     }
 
     pub(crate) fn submit_and_wait(mut self) -> Result<Completed, GpuError> {
+        self.run()
+    }
+
+    fn run(&mut self) -> Result<Completed, GpuError> {
         assert!(!self.is_rendering, "submit within rendering");
+        // Waiting for a query that never ended would never end.
+        assert!(self.counting.is_none(), "submit while {:?} counts", self.counting);
         // What the device wrote becomes visible to the host, checkpoints and read-back buffers alike.
         let to_host = MemoryBarrier {
             before: Access {
@@ -1123,11 +975,15 @@ impl Encoder {
             self.device.submit_raw(recorder.commands, recorder.fence).map_err(|r| ("vkQueueSubmit2", r));
         let done = done.and_then(|()| recorder.wait(&self.device.0.raw).map_err(|r| ("vkWaitForFences", r)));
         if let Err((call, result)) = done {
-            let reached = recorder.checkpoints.as_ref().and_then(|c| c.last_reached(label_count));
-            let pass = reached.map_or("none", |i| self.labels[i].as_str());
-            return Err(lost(call, pass)(result));
+            return Err(lost(call, self.last_label().unwrap_or("none"))(result));
         }
         self.collect()
+    }
+
+    /// The last label of the submission whose end the device has reached.
+    fn last_label(&self) -> Option<&str> {
+        let checkpoints = self.recorder.as_ref()?.checkpoints.as_ref()?;
+        checkpoints.last_reached(self.labels.len()).map(|i| self.labels[i].as_str())
     }
 
     fn collect(&mut self) -> Result<Completed, GpuError> {
@@ -1181,42 +1037,6 @@ fn statistics(counts: [u64; 7]) -> Statistics {
         fragment_invocations,
         compute_invocations,
     }
-}
-
-/// The pool of query `index`, made and reset where it is the first of its pool.
-fn query_pool(
-    device: &ash::Device,
-    pools: &mut Vec<vk::QueryPool>,
-    index: u32,
-    info: &vk::QueryPoolCreateInfo<'_>,
-) -> Result<vk::QueryPool, GpuError> {
-    let place = (index / QUERIES_PER_POOL) as usize;
-    if place == pools.len() {
-        let info = info.query_count(QUERIES_PER_POOL);
-        // SAFETY: the device is alive; it has `hostQueryReset`, as every device of Vulkan 1.3 must.
-        unsafe {
-            let pool = device.create_query_pool(&info, None).map_err(GpuError::call("vkCreateQueryPool"))?;
-            device.reset_query_pool(pool, 0, QUERIES_PER_POOL);
-            pools.push(pool);
-        }
-    }
-    Ok(pools[place])
-}
-
-/// Results of the first `count` queries, in order.
-fn query_results<T: bytemuck::Pod>(
-    device: &ash::Device,
-    pools: &[vk::QueryPool],
-    count: u32,
-) -> Result<Vec<T>, GpuError> {
-    let mut results = vec![T::zeroed(); count as usize];
-    let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
-    for (part, &pool) in results.chunks_mut(QUERIES_PER_POOL as usize).zip(pools) {
-        // SAFETY: all of these queries were used in a submission that is done; `T` is as many u64 as a query gives.
-        unsafe { device.get_query_pool_results(pool, 0, part, flags) }
-            .map_err(lost("vkGetQueryPoolResults", "all"))?;
-    }
-    Ok(results)
 }
 
 /// Attachments in read-only layouts are not stored: a store counts as a write.
@@ -1275,4 +1095,43 @@ fn stencil_attachment(stencil: &StencilAttachment<'_>) -> vk::RenderingAttachmen
         .clear_value(vk::ClearValue {
             depth_stencil: vk::ClearDepthStencilValue { depth: 0.0, stencil: cleared },
         })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::DeviceOptions;
+
+    #[test]
+    fn the_last_label_reached_is_known() {
+        let device = Device::open(&DeviceOptions::default()).expect("a device");
+        // Twice, since the second encoder gets the words of the first.
+        for names in [&["a", "b", "c"][..], &["d"]] {
+            let mut encoder = device.encoder().expect("an encoder");
+            for name in names {
+                encoder.begin_label(name);
+                encoder.end_label();
+            }
+            encoder.begin_label("never closed");
+            encoder.run().expect("done");
+            assert_eq!(encoder.last_label(), names.last().copied());
+        }
+        let mut encoder = device.encoder().expect("an encoder");
+        encoder.begin_label("outer");
+        encoder.run().expect("done");
+        assert_eq!(encoder.last_label(), None);
+    }
+
+    #[test]
+    fn time_passes_over_an_overflow_of_the_counter() {
+        let completed = Completed {
+            ticks: vec![0xffff_fff0, 0x10],
+            tick_ns: 2.0,
+            tick_mask: 0xffff_ffff,
+            statistics: vec![],
+        };
+        assert_eq!(completed.elapsed_ns(TimestampId(0), TimestampId(1)), Some(64.0));
+        let without = Completed { tick_mask: 0, ..completed };
+        assert_eq!(without.elapsed_ns(TimestampId(0), TimestampId(1)), None);
+    }
 }

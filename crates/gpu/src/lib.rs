@@ -26,6 +26,7 @@ mod image;
 mod instance;
 mod memory;
 mod pipeline;
+mod recorder;
 mod sampler;
 mod upload;
 

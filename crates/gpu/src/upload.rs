@@ -4,8 +4,9 @@
 //! host can map the target itself (CPU devices, integrated GPUs) buffers are written without a copy.
 
 use crate::device::lost;
-use crate::encoder::{Access, ImageBarrier, Recorder};
+use crate::encoder::{Access, ImageBarrier};
 use crate::format::format_info;
+use crate::recorder::Recorder;
 use crate::{Buffer, BufferDesc, Device, GpuError, Image, MemoryKind};
 use ash::vk;
 
