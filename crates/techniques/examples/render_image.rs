@@ -18,7 +18,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let technique = find(&technique).ok_or("no such technique")?;
     let mut frame = renderer.prepare(technique, &Params::default())?;
     for pass in frame.run()?.passes {
-        println!("{:>24} {:8.3} ms", pass.name, pass.time_ns as f64 / 1e6);
+        println!("{:>24} {:8.3} ms", pass.name, pass.time_ns.unwrap_or(0.0) / 1e6);
     }
     let image = Rgba8Image { width: 640, height: 360, pixels: frame.final_rgba8()? };
     image.write_png(file.as_ref())?;
