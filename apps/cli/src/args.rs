@@ -246,7 +246,11 @@ impl CommonArgs {
     /// Refuses what this version does not have yet.
     pub fn check(&self) -> Result<(), Failure> {
         let not_yet = |name: &str, found: &str, expected: &str| {
-            Err(Failure::option(name, found, format!("{expected} (nothing else is available in this version)")))
+            Err(Failure::option(
+                name,
+                found,
+                format!("{expected} (nothing else is available in this version)"),
+            ))
         };
         if self.post != Post::None {
             return not_yet("--post", &name_of(self.post), "none");

@@ -54,8 +54,10 @@ impl Failure {
                 vec![crate::text::one_line(text)]
             }
             Failure::Validation(messages) => {
-                let mut lines: Vec<String> =
-                    messages.iter().map(|message| format!("validation: {}", crate::text::one_line(message))).collect();
+                let mut lines: Vec<String> = messages
+                    .iter()
+                    .map(|message| format!("validation: {}", crate::text::one_line(message)))
+                    .collect();
                 lines.push(format!("{} Vulkan validation message(s), expected none", messages.len()));
                 lines
             }
@@ -76,7 +78,7 @@ impl From<GpuError> for Failure {
             GpuError::NoLoader { .. } | GpuError::MissingFeature { .. } => {
                 Failure::NoDevice(format!("{text}; {INSTALL_DEVICE}"))
             }
-            GpuError::NoDevice { ref found, .. } if found == "none" => {
+            GpuError::NoDevice { ref found, .. } if found.starts_with("none") => {
                 Failure::NoDevice(format!("{text}; {INSTALL_DEVICE}"))
             }
             GpuError::NoDevice { .. } => Failure::Input(format!("--device: {text}")),

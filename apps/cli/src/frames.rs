@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use afterlight_graph::FrameReport;
 use afterlight_graph::gpu::{GpuError, Statistics};
+use afterlight_image::{Rgba8Image, RgbaF32Image};
 use afterlight_measure::{Buffer, CostRecord, Memory, Pass, RunResult, Spread, Status};
 use afterlight_techniques::cost::Workload;
 use afterlight_techniques::{Params, Prepared, Renderer, TechniqueError};
@@ -15,10 +16,10 @@ use crate::session::{Chosen, ms_since};
 /// A technique's figures and its image.
 pub struct Measured {
     pub result: RunResult,
-    /// Tone-mapped sRGB, RGBA, rows from the top; none where it did not run.
-    pub rgba8: Option<Vec<u8>>,
-    /// Linear radiance, RGBA; none unless the session keeps it.
-    pub hdr_rgba: Option<Vec<f32>>,
+    /// Tone-mapped sRGB; none where it did not run.
+    pub image: Option<Rgba8Image>,
+    /// Linear radiance; none unless the session keeps it.
+    pub radiance: Option<RgbaF32Image>,
 }
 
 /// Runs a technique: a warm-up frame, then `frames` measured ones; `step` is called after each.
@@ -39,14 +40,14 @@ pub fn measure(
             let status = match error {
                 TechniqueError::Unavailable { .. }
                 | TechniqueError::Samples { .. }
-                | TechniqueError::Gpu(GpuError::UnsupportedSamples { .. } | GpuError::UnsupportedFormat { .. }) => {
-                    Status::Unavailable
-                }
+                | TechniqueError::Gpu(
+                    GpuError::UnsupportedSamples { .. } | GpuError::UnsupportedFormat { .. },
+                ) => Status::Unavailable,
                 _ => Status::Failed,
             };
             let mut result = RunResult::without_figures(chosen.id(), status, error.to_string());
             result.params = params_record(chosen);
-            Ok(Measured { result, rgba8: None, hdr_rgba: None })
+            Ok(Measured { result, image: None, radiance: None })
         }
     }
 }
@@ -82,7 +83,10 @@ fn run(
     result.counters.insert("prepare_ms".to_owned(), Value::from(prepare_ms));
     let cost = chosen.technique.predict(workload, &chosen.params);
     result.cost = Some(CostRecord { cmd: cost.cmd, proc: cost.proc, mem: cost.mem, band: cost.band });
-    Ok(Measured { result, rgba8: Some(prepared.final_rgba8()?), hdr_rgba: prepared.hdr_rgba()? })
+    let (width, height) = prepared.size_px();
+    let image = Rgba8Image { width, height, pixels: prepared.final_rgba8()? };
+    let radiance = prepared.hdr_rgba()?.map(|pixels| RgbaF32Image { width, height, pixels });
+    Ok(Measured { result, image: Some(image), radiance })
 }
 
 /// Every parameter with its value, numbers as numbers.

@@ -1,8 +1,7 @@
 //! Files and standard output: a file is complete or absent.
 
-use std::fs;
 use std::io::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde::Serialize;
 
@@ -10,29 +9,20 @@ use crate::args::JsonArgs;
 use crate::failure::Failure;
 
 fn cannot_write(path: &Path, error: &std::io::Error) -> Failure {
-    Failure::Input(format!("{}: cannot be written ({error}), expected a file in a folder that can be written", path.display()))
+    Failure::Input(format!(
+        "{}: cannot be written ({error}), expected a file in a folder that can be written",
+        path.display()
+    ))
 }
 
-/// Writes a file beside its place and renames it into it.
+/// Writes a file: beside its place, then renamed into it.
 pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    let beside = beside(path);
-    let written = fs::write(&beside, bytes).and_then(|()| fs::rename(&beside, path));
-    written.map_err(|error| {
-        // Best effort: what was not renamed is of no use.
-        let _ = fs::remove_file(&beside);
-        cannot_write(path, &error)
-    })
-}
-
-fn beside(path: &Path) -> PathBuf {
-    let mut name = path.file_name().unwrap_or_default().to_owned();
-    name.push(format!(".{}.part", std::process::id()));
-    path.with_file_name(name)
+    Ok(afterlight_image::write_atomically(path, bytes)?)
 }
 
 /// Makes a folder and those above it.
 pub fn make_folder(path: &Path) -> Result<(), Failure> {
-    fs::create_dir_all(path).map_err(|error| cannot_write(path, &error))
+    std::fs::create_dir_all(path).map_err(|error| cannot_write(path, &error))
 }
 
 /// Refuses a file whose folder is not there or cannot be written, before long work for it begins.
@@ -67,7 +57,8 @@ pub fn json(args: &JsonArgs, value: &impl Serialize) -> Result<(), Failure> {
 
 /// JSON as it is written: indented, with a line's end.
 pub fn json_text(value: &impl Serialize) -> Result<String, Failure> {
-    let text = serde_json::to_string_pretty(value).map_err(|error| Failure::Failed(format!("JSON: {error}")))?;
+    let text =
+        serde_json::to_string_pretty(value).map_err(|error| Failure::Failed(format!("JSON: {error}")))?;
     Ok(text + "\n")
 }
 
@@ -89,6 +80,7 @@ pub fn tell(args: &JsonArgs, text: &str) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::fs;
 
     #[test]
     fn a_file_is_whole_or_absent() {
@@ -101,7 +93,8 @@ mod tests {
         fs::create_dir(&taken).expect("made");
         let failure = write_file(&taken, b"abc").expect_err("fails");
         assert_eq!(failure.code(), 2);
-        let names: Vec<_> = fs::read_dir(folder.path()).expect("listed").flatten().map(|e| e.file_name()).collect();
+        let names: Vec<_> =
+            fs::read_dir(folder.path()).expect("listed").flatten().map(|e| e.file_name()).collect();
         assert_eq!(names.len(), 2, "{names:?}");
     }
 

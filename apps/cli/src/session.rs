@@ -138,12 +138,21 @@ fn check_samples(device: &Device, samples: u32) -> Result<(), Failure> {
         .filter(|count| *count == 1 || features.supports_samples(*count, false))
         .map(|count: u32| count.to_string())
         .collect();
-    Err(Failure::option("--samples", samples, format!("one of: {} (what {} has)", there.join(", "), device.info().name)))
+    Err(Failure::option(
+        "--samples",
+        samples,
+        format!("one of: {} (what {} has)", there.join(", "), device.info().name),
+    ))
 }
 
 impl Session {
     /// Loads a scene while the device opens, and uploads it.
-    pub fn open(source: &str, common: &CommonArgs, keep_hdr: bool, progress: &Progress) -> Result<Session, Failure> {
+    pub fn open(
+        source: &str,
+        common: &CommonArgs,
+        keep_hdr: bool,
+        progress: &Progress,
+    ) -> Result<Session, Failure> {
         let start = Instant::now();
         let spinner = progress.spinner(&format!("loading {source}"));
         let (device, scene) = std::thread::scope(|scope| {
@@ -262,10 +271,13 @@ fn workload(scene: &Scene, settings: &Settings) -> Workload {
         .iter()
         .map(|light| match light.kind {
             LightKind::Directional => pixels,
-            _ => sphere_pixels(&settings.camera, light.position_ws, light.range_m, settings.height_px, pixels),
+            _ => {
+                sphere_pixels(&settings.camera, light.position_ws, light.range_m, settings.height_px, pixels)
+            }
         })
         .sum();
-    let vertices = scene.instances.iter().map(|one| f64::from(scene.meshes[one.mesh as usize].vertex_count)).sum();
+    let vertices =
+        scene.instances.iter().map(|one| f64::from(scene.meshes[one.mesh as usize].vertex_count)).sum();
     Workload {
         objects: scene.instances.len() as f64,
         lights,
@@ -339,9 +351,15 @@ mod tests {
 
     #[test]
     fn parameters_reach_all_or_one() {
-        let chosen = choose("--techniques", &ids(&["forward", "deferred"]), &ids(&["cull=none", "deferred.order=scene"]))
-            .expect("known");
-        let text = |index: usize, key: &str| chosen[index].params.text(chosen[index].technique.info(), key).to_owned();
+        let chosen = choose(
+            "--techniques",
+            &ids(&["forward", "deferred"]),
+            &ids(&["cull=none", "deferred.order=scene"]),
+        )
+        .expect("known");
+        let text = |index: usize, key: &str| {
+            chosen[index].params.text(chosen[index].technique.info(), key).to_owned()
+        };
         assert_eq!((text(0, "cull"), text(1, "cull")), ("none".into(), "none".into()));
         assert_eq!((text(0, "order"), text(1, "order")), ("near".into(), "scene".into()));
     }

@@ -1,6 +1,6 @@
 //! Texts for the terminal.
 
-use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
+use comfy_table::{CellAlignment, ContentArrangement, LineStyle, Table, TableStyle};
 
 /// Returns a message as one line: what clap says of usage and help is left out, lines are joined by spaces.
 pub fn one_line(message: &str) -> String {
@@ -17,10 +17,16 @@ pub fn one_line(message: &str) -> String {
     text.strip_prefix("error: ").unwrap_or(&text).to_owned()
 }
 
+/// Lines above, below and under the heading, none between rows.
+const STYLE: TableStyle = TableStyle::new()
+    .top_border(LineStyle::none().fill('─').junction('─'))
+    .header_separator(LineStyle::none().fill('─').junction('─'))
+    .bottom_border(LineStyle::none().fill('─').junction('─'));
+
 /// Makes a table with a heading; `left` columns are of text, the others of numbers.
 pub fn table(heading: &[&str], left: usize) -> Table {
     let mut table = Table::new();
-    table.load_style(presets::UTF8_HORIZONTAL_ONLY);
+    table.load_style(STYLE);
     table.set_content_arrangement(ContentArrangement::Dynamic);
     table.set_header(heading.iter().copied());
     for index in left..heading.len() {

@@ -18,8 +18,10 @@ use crate::session::{self, Chosen, Session, ms_since};
 use crate::text;
 
 /// Experiments by name, with what each is.
-const EXPERIMENTS: &[(&str, &str)] =
-    &[("speed", "start-up time and memory of a process, frame times of every technique for several numbers of lights")];
+const EXPERIMENTS: &[(&str, &str)] = &[(
+    "speed",
+    "start-up time and memory of a process, frame times of every technique for several numbers of lights",
+)];
 
 /// Times that a process is started for a start-up figure.
 const START_UPS: usize = 3;
@@ -87,8 +89,15 @@ fn speed(args: &BenchArgs) -> Result<(), Failure> {
             let reference =
                 Chosen { technique: session::technique("reference", "forward")?, params: Params::default() };
             let with_pictures = args.report.is_some();
-            let Compared { run, pictures: drawn } =
-                compare::compare(&session, &common, &chosen, reference, args.frames, with_pictures, &progress)?;
+            let Compared { run, pictures: drawn } = compare::compare(
+                &session,
+                &common,
+                &chosen,
+                reference,
+                args.frames,
+                with_pictures,
+                &progress,
+            )?;
             if !common.quiet {
                 output::tell(&args.json, &compare::tables(&run));
             }
@@ -191,7 +200,11 @@ fn render_once(
     let output =
         command.stdin(Stdio::null()).stdout(Stdio::null()).output().map_err(|error| error.to_string())?;
     if !output.status.success() {
-        return Err(format!("{}; {}", output.status, text::one_line(&String::from_utf8_lossy(&output.stderr))));
+        return Err(format!(
+            "{}; {}",
+            output.status,
+            text::one_line(&String::from_utf8_lossy(&output.stderr))
+        ));
     }
     let json = std::fs::read_to_string(&stats).map_err(|error| error.to_string())?;
     let run: Run = serde_json::from_str(&json).map_err(|error| error.to_string())?;

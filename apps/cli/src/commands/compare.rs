@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use afterlight_image::Rgba8Image;
 use afterlight_measure::{Run, RunResult, SCHEMA, Status};
 use afterlight_report::{Picture, Report, Section, bytes_text, ms_text, psnr_text};
 use afterlight_techniques::{Exactness, Info, Params};
@@ -36,15 +37,21 @@ pub fn run(args: &CompareArgs) -> Result<(), Failure> {
     check_samples(&chosen, common.samples)?;
 
     let reference = Chosen { technique: reference, params: Params::default() };
-    let compared = compare(&session, common, &chosen, reference, args.frames, args.report.is_some(), &progress)?;
+    let compared =
+        compare(&session, common, &chosen, reference, args.frames, args.report.is_some(), &progress)?;
     output::json(&args.json, &compared.run)?;
     if !common.quiet {
         output::tell(&args.json, &tables(&compared.run));
     }
     if let Some(folder) = &args.report {
-        let section =
-            Section { heading: String::new(), note: String::new(), run: &compared.run, pictures: compared.pictures.clone() };
-        let path = write_report(folder, "Techniques compared", vec![section], &output::json_text(&compared.run)?)?;
+        let section = Section {
+            heading: String::new(),
+            note: String::new(),
+            run: &compared.run,
+            pictures: compared.pictures.clone(),
+        };
+        let path =
+            write_report(folder, "Techniques compared", vec![section], &output::json_text(&compared.run)?)?;
         output::tell(&args.json, &format!("report: {}\n", path.display()));
     }
     session.finish(common, common.quiet)?;
@@ -60,7 +67,11 @@ fn check_samples(chosen: &[Chosen], samples: u32) -> Result<(), Failure> {
     counts.sort_unstable();
     counts.dedup();
     let counts: Vec<String> = counts.iter().map(u32::to_string).collect();
-    Err(Failure::option("--samples", samples, format!("one of: {} (what these techniques render)", counts.join(", "))))
+    Err(Failure::option(
+        "--samples",
+        samples,
+        format!("one of: {} (what these techniques render)", counts.join(", ")),
+    ))
 }
 
 /// Writes `report.html` and `report.json` into a folder and returns the path of the former.
@@ -110,21 +121,29 @@ pub fn compare(
     }
     bar.finish_and_clear();
 
-    let size = (common.width, common.height);
     let spinner = progress.spinner("comparing images");
     let mut pictures = Vec::new();
-    for (one, chosen) in measured.iter_mut().zip(chosen) {
-        let (Some(image), Some(truth)) = (&one.rgba8, &truth.rgba8) else {
-            if one.rgba8.is_some() {
-                one.result.reason = Some(format!("no image of {} to compare to", reference.id()));
+    if let Some(truth) = &truth.image {
+        let images: Vec<_> = measured.iter().map(|one| one.image.as_ref()).collect();
+        let differences = pictures::differences(truth, &images)?;
+        for ((one, chosen), difference) in measured.iter_mut().zip(chosen).zip(differences) {
+            let Some(difference) = difference else { continue };
+            judge(
+                &mut one.result,
+                chosen.technique.info(),
+                difference.psnr_or_infinity_db(),
+                common.samples,
+                &reference,
+            );
+            one.result.difference = Some(difference);
+            if with_pictures {
+                pictures.extend(picture(one, truth)?);
             }
-            continue;
-        };
-        let difference = pictures::difference(truth, image, size)?;
-        judge(&mut one.result, chosen.technique.info(), difference.psnr_or_infinity_db(), common.samples, &reference);
-        one.result.difference = Some(difference);
-        if with_pictures {
-            pictures.push(picture(one, truth, size)?);
+        }
+    } else {
+        let why = truth.result.reason.as_deref().unwrap_or("it drew nothing");
+        for one in measured.iter_mut().filter(|one| one.image.is_some()) {
+            one.result.reason = Some(format!("no image of {} to compare to: {why}", reference.id()));
         }
     }
     spinner.finish_and_clear();
@@ -164,24 +183,27 @@ fn judge(result: &mut RunResult, info: &Info, psnr_db: f64, samples: u32, refere
     }
 }
 
-fn picture(measured: &Measured, truth: &[u8], size: (u32, u32)) -> Result<Picture, Failure> {
-    let image = measured.rgba8.as_deref().unwrap_or_default();
-    let difference = measured.result.difference;
-    let caption = difference.map_or_else(String::new, |difference| {
-        format!(
+/// What a report shows of a technique's image; none where there is none.
+fn picture(measured: &Measured, truth: &Rgba8Image) -> Result<Option<Picture>, Failure> {
+    let (Some(image), Some(difference)) = (&measured.image, measured.result.difference) else {
+        return Ok(None);
+    };
+    let is_same = difference.max_abs == 0;
+    let caption = match is_same {
+        true => "equal to the reference".to_owned(),
+        false => format!(
             "{} dB, at most {} of 255; difference ×{}",
             psnr_text(difference.psnr_or_infinity_db()),
             difference.max_abs,
             pictures::AMPLIFICATION
-        )
-    });
-    let is_same = difference.is_some_and(|difference| difference.max_abs == 0);
-    Ok(Picture {
+        ),
+    };
+    Ok(Some(Picture {
         technique: measured.result.technique.clone(),
-        image_png: pictures::png(image, size)?,
-        difference_png: if is_same { None } else { Some(pictures::difference_png(truth, image, size)?) },
-        difference_caption: if is_same { "equal to the reference".to_owned() } else { caption },
-    })
+        image_png: pictures::png(image)?,
+        difference_png: if is_same { None } else { Some(pictures::difference_png(truth, image)?) },
+        difference_caption: caption,
+    }))
 }
 
 /// The exit code's reason: a technique that broke off or whose image is off.
@@ -218,14 +240,17 @@ pub fn tables(run: &Run) -> String {
 
 fn technique_table(run: &Run) -> Table {
     let psnr = format!("PSNR to {}", run.settings.reference);
-    let heading = ["technique", "status", "frame ms", "min – max", "record ms", "memory", "peak", &psnr, "max", "FLIP"];
+    let heading =
+        ["technique", "status", "frame ms", "min – max", "record ms", "memory", "peak", &psnr, "max", "FLIP"];
     let mut table = text::table(&heading, 2);
     for result in &run.results {
         let dash = || "–".to_owned();
         let (frame, memory, difference) = (result.frame_ms, result.memory.as_ref(), result.difference);
         let status = match (result.status, &result.reason) {
             (Status::Ok, _) => "ok".to_owned(),
-            (Status::Unavailable, reason) => format!("unavailable: {}", reason.as_deref().unwrap_or_default()),
+            (Status::Unavailable, reason) => {
+                format!("unavailable: {}", reason.as_deref().unwrap_or_default())
+            }
             (Status::Failed, reason) => format!("failed: {}", reason.as_deref().unwrap_or_default()),
         };
         table.add_row([

@@ -58,8 +58,10 @@ fn device_json(info: &DeviceInfo, features: &Features, missing: &[&str]) -> Valu
             json!({ "technique": technique.info().id, "available": available, "missing": lacks })
         })
         .collect();
-    let optional: serde_json::Map<String, Value> =
-        optional(features).into_iter().map(|(name, there)| (name.replace([' ', '-'], "_"), there.into())).collect();
+    let optional: serde_json::Map<String, Value> = optional(features)
+        .into_iter()
+        .map(|(name, there)| (name.replace([' ', '-'], "_"), there.into()))
+        .collect();
     json!({
         "index": info.index,
         "name": info.name,
@@ -81,12 +83,17 @@ fn device_json(info: &DeviceInfo, features: &Features, missing: &[&str]) -> Valu
 
 fn device_text(info: &DeviceInfo, features: &Features, missing: &[&str]) -> String {
     let mut text = String::new();
-    let _ = writeln!(text, "{}: {} ({}), driver {}, Vulkan {}", info.index, info.name, info.kind, info.driver, info.api);
+    let _ = writeln!(
+        text,
+        "{}: {} ({}), driver {}, Vulkan {}",
+        info.index, info.name, info.kind, info.driver, info.api
+    );
     if !missing.is_empty() {
         let _ = writeln!(text, "   not usable: lacks {}", missing.join(", "));
     }
     let there = |wanted: bool| -> String {
-        let names: Vec<_> = optional(features).into_iter().filter(|(_, is)| *is == wanted).map(|(name, _)| name).collect();
+        let names: Vec<_> =
+            optional(features).into_iter().filter(|(_, is)| *is == wanted).map(|(name, _)| name).collect();
         if names.is_empty() { "nothing".to_owned() } else { names.join(", ") }
     };
     let _ = writeln!(text, "   has    {}", there(true));

@@ -47,17 +47,17 @@ pub fn run(args: &RenderArgs) -> Result<(), Failure> {
     let spinner = progress.spinner(&format!("rendering with {}", chosen.id()));
     let measured = frames::measure(&session.renderer, chosen, &session.workload, 0, || {})?;
     spinner.finish_and_clear();
-    let Measured { result, rgba8, hdr_rgba } = measured;
-    let Some(rgba8) = rgba8 else {
+    let Measured { result, image, radiance } = measured;
+    let Some(image) = image else {
         let reason = result.reason.unwrap_or_default();
         return Err(match result.status {
             Status::Unavailable => Failure::Input(reason),
             _ => Failure::Failed(reason),
         });
     };
-    match (format, hdr_rgba) {
-        (Format::Exr, Some(hdr_rgba)) => pictures::write_exr(&args.output, common.width, common.height, hdr_rgba)?,
-        _ => pictures::write_png(&args.output, common.width, common.height, rgba8)?,
+    match (format, radiance) {
+        (Format::Exr, Some(radiance)) => pictures::write_exr(&args.output, &radiance)?,
+        _ => pictures::write_png(&args.output, &image)?,
     }
     let first_image_ms = ms_since(start);
     if let Some(path) = &args.stats {

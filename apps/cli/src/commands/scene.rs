@@ -32,11 +32,7 @@ fn memory(scene: &Scene) -> MemoryUse {
     let vertex_bytes = (size_of::<[f32; 3]>() + size_of::<VertexAttributes>()) as u64;
     MemoryUse {
         geometry_bytes: vertices * vertex_bytes + scene.indices.len() as u64 * 4,
-        texture_bytes: scene
-            .images
-            .iter()
-            .map(|image| mip_texels(image.width, image.height) * 4)
-            .sum(),
+        texture_bytes: scene.images.iter().map(|image| mip_texels(image.width, image.height) * 4).sum(),
     }
 }
 
@@ -51,7 +47,8 @@ fn mip_texels(mut width: u32, mut height: u32) -> u64 {
 
 /// Numbers of point, spot and directional lights.
 fn light_counts(scene: &Scene) -> [usize; 3] {
-    let count = |wanted: fn(&LightKind) -> bool| scene.lights.iter().filter(|light| wanted(&light.kind)).count();
+    let count =
+        |wanted: fn(&LightKind) -> bool| scene.lights.iter().filter(|light| wanted(&light.kind)).count();
     [
         count(|kind| matches!(kind, LightKind::Point)),
         count(|kind| matches!(kind, LightKind::Spot { .. })),
@@ -140,7 +137,11 @@ fn scene_text(scene: &Scene) -> String {
     );
     line(
         "memory",
-        format!("{} geometry, {} textures", bytes_text(memory.geometry_bytes), bytes_text(memory.texture_bytes)),
+        format!(
+            "{} geometry, {} textures",
+            bytes_text(memory.geometry_bytes),
+            bytes_text(memory.texture_bytes)
+        ),
     );
     for warning in &scene.warnings {
         line("warning", warning.clone());

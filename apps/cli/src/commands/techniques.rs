@@ -39,7 +39,8 @@ fn technique_text(info: &Info) -> String {
     let mut text = String::new();
     let _ = writeln!(text, "{} — {}", info.id, info.title);
     let _ = writeln!(text, "   {}", info.summary);
-    let sources: Vec<String> = info.sources.iter().map(|source| format!("{} {}", source.key, source.section)).collect();
+    let sources: Vec<String> =
+        info.sources.iter().map(|source| format!("{} {}", source.key, source.section)).collect();
     let _ = writeln!(text, "   sources    {}", sources.join("; "));
     let answers = &info.answers;
     for (question, answer) in [
@@ -77,7 +78,8 @@ fn technique_text(info: &Info) -> String {
         let _ = writeln!(text, "   needs      {}", needs.join(", "));
     }
     for param in Params::known(info) {
-        let _ = writeln!(text, "   --set {}={} ({}): {}", param.key, param.default, range(param), param.summary);
+        let _ =
+            writeln!(text, "   --set {}={} ({}): {}", param.key, param.default, range(param), param.summary);
     }
     text.push('\n');
     text

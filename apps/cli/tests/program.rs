@@ -1,0 +1,318 @@
+//! The program as a user meets it: output, exit codes, one line for each bad input.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+/// Runs the program in a folder of its own with a cache of its own.
+fn run_in(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_afterlight"))
+        .args(arguments)
+        .current_dir(folder)
+        .env("XDG_CACHE_HOME", folder.join("cache"))
+        .output()
+        .expect("the program starts")
+}
+
+fn folder() -> TempDir {
+    TempDir::new().expect("a temporary folder")
+}
+
+fn run(arguments: &[&str]) -> Output {
+    run_in(folder().path(), arguments)
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+/// Asserts the exit code and one line on standard error that holds every part; returns the line.
+fn refused(arguments: &[&str], code: i32, parts: &[&str]) -> String {
+    let folder = folder();
+    let output = run_in(folder.path(), arguments);
+    let line = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(code), "{arguments:?}: {line}");
+    assert_eq!(line.lines().count(), 1, "{arguments:?}: expected one line, found:\n{line}");
+    assert!(line.starts_with("afterlight: "), "{line}");
+    for part in parts {
+        assert!(line.contains(part), "{arguments:?}: expected `{part}` in: {line}");
+    }
+    assert!(output.stdout.is_empty(), "{arguments:?}: {}", text(&output.stdout));
+    let left: Vec<_> = fs::read_dir(folder.path())
+        .expect("listed")
+        .flatten()
+        .map(|entry| entry.file_name())
+        .filter(|name| name != "cache")
+        .collect();
+    assert!(left.is_empty(), "{arguments:?}: left {left:?}");
+    line
+}
+
+/// Whether there is a device; tells where there is none.
+fn has_device() -> bool {
+    let there = run(&["devices"]).status.success();
+    if !there {
+        eprintln!("skipped: no Vulkan device on this machine");
+    }
+    there
+}
+
+fn json(output: &Output) -> Value {
+    serde_json::from_slice(&output.stdout)
+        .unwrap_or_else(|error| panic!("{error}: {} / {}", text(&output.stdout), text(&output.stderr)))
+}
+
+#[test]
+fn bad_usage_is_one_line_and_exit_code_2() {
+    refused(&["explode"], 2, &["explode"]);
+    refused(&["compare", "--bogus"], 2, &["--bogus"]);
+    refused(&["compare", "--width", "0"], 2, &["--width"]);
+    refused(&["compare", "--width", "many"], 2, &["--width", "many"]);
+    refused(&["compare", "--samples", "3"], 2, &["--samples", "3", "1, 2, 4, 8 or 16"]);
+    refused(&["compare", "--lights", "-1"], 2, &["-1"]);
+    refused(&["compare", "--techniques", "forward,backward"], 2, &["backward", "one of: ", "forward"]);
+    refused(&["compare", "--reference", "backward"], 2, &["--reference", "backward"]);
+    refused(&["compare", "--set", "nokey=1"], 2, &["nokey", "cull"]);
+    refused(&["compare", "--set", "cull=perhaps"], 2, &["cull", "perhaps", "frustum"]);
+    refused(&["compare", "--set", "cull"], 2, &["--set", "KEY=VALUE"]);
+    refused(&["compare", "--json", "builtin:spheres"], 2, &["--json", "builtin:spheres"]);
+    refused(&["compare", "--post", "fxaa"], 2, &["--post", "fxaa", "none"]);
+    refused(&["compare", "--post", "blur"], 2, &["--post", "blur", "fxaa"]);
+    refused(&["compare", "--shadows", "pcss"], 2, &["--shadows", "pcss"]);
+    refused(&["compare", "--indirect", "rsm"], 2, &["--indirect", "rsm"]);
+    refused(&["compare", "--view", "normals"], 2, &["--view", "normals", "final"]);
+    refused(&["bench", "everything"], 2, &["everything", "speed"]);
+    refused(&["completions", "csh"], 2, &["csh"]);
+    refused(&["render", "-o", "a.png"], 2, &["--technique"]);
+    refused(&["render", "--technique", "forward", "-o", "a.jpg"], 2, &["a.jpg", ".png or .exr"]);
+    refused(&["render", "--technique", "forward", "-o", "no/such/a.png"], 2, &["no/such"]);
+    refused(&["render", "--technique", "all", "-o", "a.png"], 2, &["one technique"]);
+}
+
+#[test]
+fn bad_scenes_are_one_line_and_exit_code_2() {
+    for command in [&["scene"][..], &["compare"], &["render", "--technique", "forward", "-o", "a.png"]] {
+        let with = |scene| [command, &[scene]].concat();
+        refused(&with("absent.gltf"), 2, &["absent.gltf"]);
+        refused(&with("absent.txt"), 2, &["absent.txt", ".gltf"]);
+        refused(&with("builtin:nothing"), 2, &["nothing", "colonnade"]);
+        refused(&with("builtin:colonnade?triangles=none"), 2, &["triangles", "none"]);
+    }
+}
+
+#[test]
+fn no_device_is_exit_code_4_with_a_command() {
+    let folder = folder();
+    for arguments in [
+        &["devices"][..],
+        &["render", "builtin:edge", "--technique", "forward", "-o", "a.png"],
+        &["compare", "builtin:edge"],
+    ] {
+        let output = Command::new(env!("CARGO_BIN_EXE_afterlight"))
+            .args(arguments)
+            .current_dir(folder.path())
+            .env("VK_ICD_FILENAMES", "/nonexistent/driver.json")
+            .env("VK_DRIVER_FILES", "/nonexistent/driver.json")
+            .output()
+            .expect("the program starts");
+        let line = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(4), "{arguments:?}: {line}");
+        assert!(line.contains("apt-get install") && line.lines().count() == 1, "{line}");
+    }
+}
+
+#[test]
+fn unknown_device_and_camera_list_what_there_is() {
+    if !has_device() {
+        return;
+    }
+    let render = ["render", "builtin:edge", "--technique", "forward", "-o", "a.png"];
+    refused(&[&render[..], &["--device", "nosuchdevice"]].concat(), 2, &["nosuchdevice"]);
+    refused(&[&render[..], &["--device", "99"]].concat(), 2, &["99"]);
+    refused(&[&render[..], &["--camera", "nosuchcamera"]].concat(), 2, &["nosuchcamera"]);
+    refused(&[&render[..], &["--width", "1000000"]].concat(), 2, &["1000000"]);
+}
+
+#[test]
+fn lists_are_text_and_json() {
+    let techniques = json(&run(&["techniques", "--json"]));
+    let list = techniques["techniques"].as_array().expect("a list");
+    assert!(list.iter().any(|one| one["id"] == "forward"));
+    for one in list {
+        for key in ["title", "sources", "answers", "appendix_a", "exactness", "params"] {
+            assert!(!one[key].is_null(), "{}: {key}", one["id"]);
+        }
+    }
+    let plain = text(&run(&["techniques"]).stdout);
+    assert!(plain.contains("forward") && plain.contains("appendix A"), "{plain}");
+    let scene = json(&run(&["scene", "builtin:spheres", "--json", "-"]));
+    assert!(scene["triangles"].as_u64().is_some_and(|count| count > 0), "{scene}");
+    assert!(text(&run(&["scene", "builtin:spheres"]).stdout).contains("triangles"));
+    if has_device() {
+        let devices = json(&run(&["devices", "--json"]));
+        assert!(
+            devices["devices"][0]["techniques"].as_array().is_some_and(|all| all.len() == list.len()),
+            "{devices}"
+        );
+    }
+}
+
+#[test]
+fn completions_and_help_are_printed() {
+    for shell in ["bash", "zsh", "fish"] {
+        assert!(text(&run(&["completions", shell]).stdout).contains("afterlight"), "{shell}");
+    }
+    let help = run(&["compare", "--help"]);
+    assert!(help.status.success() && text(&help.stdout).contains("--techniques"));
+    assert!(run(&["--version"]).status.success());
+    assert_eq!(run(&[]).status.code(), Some(2));
+}
+
+const SMALL: [&str; 6] = ["--width", "48", "--height", "27", "--lights", "8"];
+
+#[test]
+fn render_writes_png_exr_and_figures() {
+    if !has_device() {
+        return;
+    }
+    let folder = folder();
+    for name in ["a.png", "a.exr"] {
+        let arguments = [
+            &["render", "builtin:spheres", "--technique", "forward", "-o", name, "--stats", "s.json"][..],
+            &SMALL,
+        ]
+        .concat();
+        let output = run_in(folder.path(), &arguments);
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        assert!(output.stdout.is_empty());
+    }
+    let png = fs::read(folder.path().join("a.png")).expect("written");
+    assert_eq!(&png[..8], b"\x89PNG\r\n\x1a\n");
+    assert_eq!((&png[16..20], &png[20..24]), (&[0, 0, 0, 48][..], &[0, 0, 0, 27][..]));
+    let exr = fs::read(folder.path().join("a.exr")).expect("written");
+    assert_eq!(&exr[..4], &[0x76, 0x2f, 0x31, 0x01]);
+    let stats: Value =
+        serde_json::from_slice(&fs::read(folder.path().join("s.json")).expect("written")).expect("is JSON");
+    assert!(stats["process"]["first_image_ms"].as_f64().is_some_and(|ms| ms > 0.0));
+    assert_eq!(stats["results"][0]["technique"], "forward");
+}
+
+#[test]
+fn compare_writes_the_schema_table_and_report() {
+    if !has_device() {
+        return;
+    }
+    let folder = folder();
+    let arguments = [
+        &[
+            "compare",
+            "builtin:spheres",
+            "--techniques",
+            "forward,tiled",
+            "--frames",
+            "2",
+            "--json",
+            "-",
+            "--report",
+            "r",
+        ][..],
+        &SMALL,
+    ]
+    .concat();
+    let output = run_in(folder.path(), &arguments);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let run = json(&output);
+    assert_eq!(run["schema"], 1);
+    for key in ["name", "driver", "api", "type"] {
+        assert!(run["device"][key].is_string(), "device.{key}");
+    }
+    assert_eq!(run["scene"]["lights"], 8);
+    assert_eq!((&run["settings"]["width"], &run["settings"]["frames"]), (&48.into(), &2.into()));
+    let results = run["results"].as_array().expect("a list");
+    assert_eq!(results.len(), 2);
+    for result in results {
+        assert_eq!(result["status"], "ok", "{result}");
+        for key in ["median", "min", "max"] {
+            assert!(result["frame_ms"][key].as_f64().is_some_and(|ms| ms > 0.0), "{key}");
+        }
+        let passes = result["passes"].as_array().expect("passes");
+        assert!(!passes.is_empty());
+        assert!(
+            passes[0]["ms"]["median"].is_f64() && passes[0]["fragment_invocations"].is_u64(),
+            "{passes:?}"
+        );
+        assert!(result["memory"]["technique_bytes"].is_u64() && result["memory"]["peak_bytes"].is_u64());
+        for key in ["cmd", "proc", "mem", "band"] {
+            assert!(result["cost"][key].is_number(), "cost.{key}");
+        }
+        assert!(
+            result["difference"]["psnr_db"].as_f64().is_some_and(|db| db >= 50.0),
+            "{}",
+            result["difference"]
+        );
+        assert!(result["difference"]["max_abs"].is_u64() && result["difference"]["flip"].is_number());
+    }
+    // The table went to standard error, since JSON took standard output.
+    assert!(text(&output.stderr).contains("tiled/"), "{}", text(&output.stderr));
+    let html = fs::read_to_string(folder.path().join("r/report.html")).expect("written");
+    assert!(html.contains("data:image/png;base64,") && html.contains("tiled"));
+    assert!(folder.path().join("r/report.json").is_file());
+}
+
+#[test]
+fn samples_that_the_device_lacks_are_told() {
+    if !has_device() {
+        return;
+    }
+    let devices = json(&run(&["devices", "--json"]));
+    let there = devices["devices"][0]["samples"]["color"].as_array().expect("a list").clone();
+    let Some(lacking) = ["2", "8", "16"]
+        .into_iter()
+        .find(|count| !there.contains(&count.parse::<u64>().expect("a number").into()))
+    else {
+        eprintln!("skipped: the device has every number of samples");
+        return;
+    };
+    refused(
+        &["compare", "builtin:edge", "--device", "0", "--samples", lacking],
+        2,
+        &["--samples", lacking, "one of: 1"],
+    );
+}
+
+/// The folder of reference scenes, beside the repository.
+fn reference_scenes() -> Option<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/scenes");
+    if !folder.is_dir() {
+        eprintln!("skipped: no reference scenes in {}", folder.display());
+        return None;
+    }
+    Some(folder)
+}
+
+#[test]
+fn every_invalid_sample_is_told_or_loads() {
+    let Some(scenes) = reference_scenes() else { return };
+    let mut stack = vec![scenes.join("samples/invalid")];
+    let mut files = Vec::new();
+    while let Some(folder) = stack.pop() {
+        for path in fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path()) {
+            let extension = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+            if path.is_dir() {
+                stack.push(path);
+            } else if ["gltf", "glb", "obj"].contains(&extension.as_str()) {
+                files.push(path);
+            }
+        }
+    }
+    assert!(!files.is_empty(), "no file in samples/invalid");
+    // Loading alone, in this process: starting one for each of hundreds of files would take minutes.
+    for path in files {
+        if let Err(error) = afterlight_scene::load(&path, &afterlight_scene::LoadOptions::default()) {
+            assert_eq!(error.to_string().lines().count(), 1, "{}: {error}", path.display());
+        }
+    }
+}
