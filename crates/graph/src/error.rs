@@ -153,8 +153,8 @@ pub enum GraphError {
         /// The other.
         second: String,
     },
-    /// A range of mip levels or layers lies outside its image.
-    #[error("pass {pass}: range {found} of {resource:?}; the image has {expected}")]
+    /// A range of mip levels or layers lies outside its image, or is not one that the shader can see.
+    #[error("pass {pass}: range of {resource:?}: found {found}, expected {expected}")]
     Range {
         /// The pass.
         pass: String,
@@ -162,7 +162,7 @@ pub enum GraphError {
         resource: String,
         /// The range asked for.
         found: String,
-        /// What the image has.
+        /// What the image has, or the shader takes.
         expected: String,
     },
     /// A handle of another graph was used.

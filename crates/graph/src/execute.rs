@@ -17,7 +17,9 @@ use crate::declare::{
     StencilTest, Subresource, TransferNode,
 };
 use crate::error::GraphError;
-use crate::plan::{Barrier, MemoryNeed, Plan, PlannedPass, Requirements, aspects, is_shared, mip_extent};
+use crate::plan::{
+    Barrier, MemoryNeed, Placement, Plan, PlannedPass, Requirements, aspects, is_shared, mip_extent,
+};
 use crate::report::{FrameReport, PassReport, ResourceReport};
 
 impl Requirements for Device {
@@ -503,7 +505,13 @@ fn make_resources(device: &Device, plan: &Plan) -> Result<Vec<Physical>, GraphEr
         .heaps
         .iter()
         .enumerate()
-        .map(|(index, heap)| device.create_heap(&format!("frame heap {index}"), heap.bytes, heap.type_bits))
+        .map(|(index, heap)| {
+            let inside = |place: Option<Placement>| place.is_some_and(|place| place.heap == index);
+            let residents = plan.resources.iter().filter(|resource| inside(resource.placement));
+            let largest =
+                residents.max_by_key(|resource| resource.need.bytes).map_or("", |resource| &resource.name);
+            device.create_heap(&format!("frame heap of {largest} and others"), heap.bytes, heap.type_bits)
+        })
         .collect::<Result<_, _>>()?;
     plan.resources
         .iter()

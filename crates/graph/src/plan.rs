@@ -344,10 +344,40 @@ impl<'a> Resolver<'a> {
             let readable = uses.iter().any(|bound| bound.readable);
             let write = slot.intent == Intent::Write;
             let range = self.range(id, slot.range)?;
+            if self.info(id).is_some() {
+                self.view_fits(id, &slot.slot, range, &uses)?;
+            }
             let kinds: Vec<BindingKind> = uses.iter().map(|bound| bound.kind).collect();
             self.slot_access(id, range, stages, &kinds, write, readable);
         }
         Ok(())
+    }
+
+    /// Checks that one view shows the range as the shader wants it: a storage image has one level, an image that is no
+    /// array has one layer.
+    fn view_fits(
+        &self,
+        id: ResourceId,
+        slot: &str,
+        range: Subresource,
+        uses: &[&BoundSlot],
+    ) -> Result<(), GraphError> {
+        let name = &self.node(id).name;
+        let one_level = uses.iter().any(|bound| bound.kind == BindingKind::StorageImage);
+        let one_layer = uses.iter().any(|bound| !bound.arrayed);
+        let (found, expected) = if one_level && range.mip_count != 1 {
+            (format!("{} mip levels of {name:?}", range.mip_count), "1 level (a storage image)")
+        } else if one_layer && range.layer_count != 1 {
+            (format!("{} layers of {name:?}", range.layer_count), "1 layer (the shader's image is no array)")
+        } else {
+            return Ok(());
+        };
+        Err(GraphError::Range {
+            pass: self.pass.name.clone(),
+            resource: format!("{name} in slot {slot}"),
+            found,
+            expected: expected.to_owned(),
+        })
     }
 
     fn slot_access(

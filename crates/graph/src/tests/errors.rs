@@ -196,6 +196,20 @@ fn bad_resources_and_ranges() {
 }
 
 #[test]
+fn a_range_that_the_shader_cannot_see() {
+    let store = shader("store", Stage::Compute, &[Slot("to", BindingKind::StorageImage, "w")]);
+    for (info, parts) in [
+        (ImageInfo::new(COLOR, 4, 4).mips(3), ["pass p", "in slot to", "3 mip levels", "1 level"]),
+        (ImageInfo::new(COLOR, 4, 4).layers(2), ["pass p", "in slot to", "2 layers", "1 layer"]),
+    ] {
+        let mut g = Graph::new();
+        let image = g.image("many", info);
+        let _ = g.compute("p", &store).write("to", image);
+        names_all(&message(g), &parts);
+    }
+}
+
+#[test]
 fn a_handle_of_another_graph() {
     let mut other = Graph::new();
     let foreign = other.buffer("b", 4);

@@ -12,7 +12,7 @@ use afterlight_shader::{
 
 use crate::{ImageInfo, MemoryNeed, Requirements};
 
-/// Memory as a made-up device would want it: 64 KiB pages for images, 256 bytes for buffers, a type of its own for
+/// Memory as a made-up device would want it: 4 KiB pages for images, 256 bytes for buffers, a type of its own for
 /// multisampled images.
 pub struct FakeDevice;
 
@@ -28,7 +28,7 @@ impl Requirements for FakeDevice {
     }
 }
 
-/// One binding of a made-up shader.
+/// One binding of a made-up shader: name, kind, and `r` readable, `w` writable, `a` array.
 pub struct Slot(pub &'static str, pub BindingKind, pub &'static str);
 
 pub fn shader(name: &str, stage: Stage, slots: &[Slot]) -> Shader {
@@ -47,7 +47,11 @@ pub fn shader(name: &str, stage: Stage, slots: &[Slot]) -> Shader {
                 kind,
                 BindingKind::SampledImage | BindingKind::CombinedImageSampler | BindingKind::StorageImage
             )
-            .then_some(ImageShape { dim: ImageDim::D2, arrayed: false, multisampled: false }),
+            .then_some(ImageShape {
+                dim: ImageDim::D2,
+                arrayed: mode.contains('a'),
+                multisampled: false,
+            }),
         })
         .collect::<Vec<_>>();
     Shader {
