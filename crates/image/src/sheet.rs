@@ -1,0 +1,80 @@
+use crate::{Flip, ImageError, Rgba8Image};
+
+/// A difference image: each channel's absolute difference times `amplification`, clamped; opaque.
+///
+/// # Errors
+/// [`ImageError::SizeMismatch`].
+pub fn difference_sheet(
+    reference: &Rgba8Image,
+    test: &Rgba8Image,
+    amplification: f32,
+) -> Result<Rgba8Image, ImageError> {
+    let (found, expected) = ((test.width, test.height), (reference.width, reference.height));
+    if found != expected {
+        return Err(ImageError::SizeMismatch { what: "difference sheet", found, expected });
+    }
+    let pairs = reference.pixels.chunks_exact(4).zip(test.pixels.chunks_exact(4));
+    let amplified = |a: u8, b: u8| (f32::from(a.abs_diff(b)) * amplification).clamp(0.0, 255.0).round() as u8;
+    let pixels = pairs
+        .flat_map(|(a, b)| [amplified(a[0], b[0]), amplified(a[1], b[1]), amplified(a[2], b[2]), 255])
+        .collect();
+    Rgba8Image::new(reference.width, reference.height, pixels)
+}
+
+/// A heat image of a FLIP map: an error of `full_scale` (0 to 1, positive) and more is the brightest colour.
+///
+/// # Errors
+/// [`ImageError::Length`] where the map does not fit its size.
+pub fn heat_sheet(flip: &Flip, full_scale: f32) -> Result<Rgba8Image, ImageError> {
+    let color = |e: &f32| {
+        let [r, g, b] = heat_color(e / full_scale);
+        [r, g, b, 255]
+    };
+    Rgba8Image::new(flip.width, flip.height, flip.map.iter().flat_map(color).collect())
+}
+
+/// Nine colours of Viridis (van der Walt and Smith 2015) at even distances, sRGB.
+const VIRIDIS: [[u8; 3]; 9] = [
+    [68, 1, 84],
+    [71, 44, 122],
+    [59, 81, 139],
+    [44, 113, 142],
+    [33, 144, 141],
+    [39, 173, 129],
+    [92, 200, 99],
+    [170, 220, 50],
+    [253, 231, 37],
+];
+
+/// The false colour of a value from 0 to 1, clamped; sRGB. Not a number counts as 0. Between the table's nine
+/// colours it is linear: within 6 of 255 of the published map.
+pub fn heat_color(value: f32) -> [u8; 3] {
+    let place = if value > 0.0 { value.min(1.0) } else { 0.0 } * (VIRIDIS.len() - 1) as f32;
+    let i = (place as usize).min(VIRIDIS.len() - 2);
+    let t = place - i as f32;
+    [0, 1, 2].map(|c| {
+        let (a, b) = (f32::from(VIRIDIS[i][c]), f32::from(VIRIDIS[i + 1][c]));
+        (a + (b - a) * t).round() as u8
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn differences_are_amplified_and_clamped() {
+        let a = Rgba8Image { width: 1, height: 1, pixels: vec![10, 10, 10, 255] };
+        let b = Rgba8Image { width: 1, height: 1, pixels: vec![12, 10, 200, 0] };
+        assert_eq!(difference_sheet(&a, &b, 8.0).expect("sizes").pixels, [16, 0, 255, 255]);
+    }
+
+    #[test]
+    fn heat_grows_from_dark_to_bright() {
+        let brightness = |v: f32| heat_color(v).iter().map(|c| u32::from(*c)).sum::<u32>();
+        assert_eq!(heat_color(0.0), VIRIDIS[0]);
+        assert_eq!(heat_color(7.0), VIRIDIS[8]);
+        assert_eq!(heat_color(f32::NAN), VIRIDIS[0]);
+        assert!((0..20).all(|i| brightness(i as f32 / 20.0) < brightness((i + 1) as f32 / 20.0)));
+    }
+}
