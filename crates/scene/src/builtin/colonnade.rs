@@ -400,7 +400,7 @@ fn column(d: Detail) -> MeshData {
         let radius = radius - FLUTE_M * ends * (0.5 * f64::from(FLUTES) * angle).sin().abs();
         DVec3::new(radius * angle.cos(), foot + (head - foot) * t, -radius * angle.sin())
     };
-    let divisions = [d.steps(8 * FLUTES, FLUTES), d.grid([20, 1])[0]];
+    let divisions = [d.steps(8 * FLUTES, FLUTES), d.grid([14, 1])[0]];
     let axis = DVec3::Y * (0.5 * (foot + head));
     mesh.patch(divisions, Front::AwayFrom(axis), shaft, |s, t| DVec2::new(2.0 * s, 2.6 * (1.0 - t)));
     let capital = |t: f64| {
@@ -537,7 +537,9 @@ fn curtains(d: Detail, phase: f64, rod_y: f64) -> MeshData {
             let y = rod_y - (rod_y - 0.05) * t * drop - 0.02 * (PI * s).sin() * t;
             DVec3::new(x, y, z)
         };
-        mesh.patch(d.grid([44, 30]), Front::Along(DVec3::Z), position, |s, t| DVec2::new(s, 2.4 * t));
+        // at least four divisions a fold: fewer would turn triangles against their normals
+        let divisions = [d.steps(60, 20), d.steps(32, 8)];
+        mesh.patch(divisions, Front::Along(DVec3::Z), position, |s, t| DVec2::new(s, 2.4 * t));
     }
     mesh
 }

@@ -152,6 +152,8 @@ impl MeshData {
     ) {
         let axis_point = center + DVec3::Y * profile(0.5).y;
         let front = if inside { Front::Towards(axis_point) } else { Front::AwayFrom(axis_point) };
+        // fewer than six around would be no body of revolution
+        let divisions = [divisions[0].max(6), divisions[1]];
         let position = |s: f64, t: f64| {
             let p = profile(t);
             let angle = TAU * s.fract();
@@ -168,7 +170,7 @@ impl MeshData {
             let cos = if t == 0.0 || t == 1.0 { 0.0 } else { angle.cos() };
             DVec2::new(radius_m * cos, radius_m * angle.sin())
         };
-        self.revolve([segments.max(3), (segments / 2).max(2)], center, false, profile, DVec2::ONE);
+        self.revolve([segments.max(6), (segments / 2).max(3)], center, false, profile, DVec2::ONE);
     }
 
     /// Adds a tube about a closed or open curve; the frame is turned by `up`, which must not be parallel to the curve.
@@ -180,6 +182,8 @@ impl MeshData {
         up: DVec3,
         uv_repeats: DVec2,
     ) {
+        // fewer than four around would be no tube
+        let divisions = [divisions[0], divisions[1].max(4)];
         let middle = curve(0.5);
         let position = |s: f64, t: f64| {
             let along = (curve(s + DIFFERENCE) - curve(s - DIFFERENCE)).normalize();

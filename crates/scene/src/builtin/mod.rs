@@ -48,7 +48,7 @@ impl Values {
 }
 
 const SEGMENTS: Key =
-    Key { name: "segments", default: 128, min: 3, max: 2048, about: "divisions around a sphere's equator" };
+    Key { name: "segments", default: 128, min: 6, max: 2048, about: "divisions around a sphere's equator" };
 
 const TEXTURE: Key = Key {
     name: "texture",

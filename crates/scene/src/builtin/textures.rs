@@ -56,13 +56,16 @@ pub(super) fn baked_material(
         .map(|i| texel(at(i % size), at(i / size)))
         .collect();
     let byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8;
-    let base =
-        texels.iter().flat_map(|t| [byte(t.color[0]), byte(t.color[1]), byte(t.color[2]), byte(t.alpha)]);
-    let base = base.collect();
-    let orm =
-        texels.iter().flat_map(|t| [byte(t.occlusion), byte(t.roughness), byte(t.metal), 255]).collect();
+    let pixels = |pixel: &(dyn Fn(usize) -> [u8; 4] + Sync)| -> Vec<u8> {
+        (0..size * size).into_par_iter().with_min_len(4096).flat_map_iter(pixel).collect()
+    };
+    let base = pixels(&|i| {
+        let [r, g, b] = texels[i].color;
+        [byte(r), byte(g), byte(b), byte(texels[i].alpha)]
+    });
+    let orm = pixels(&|i| [byte(texels[i].occlusion), byte(texels[i].roughness), byte(texels[i].metal), 255]);
     let height = |x: usize, y: usize| texels[(y % size) * size + x % size].height;
-    let normals = (0..size * size).flat_map(|i| {
+    let normals = pixels(&|i| {
         let (x, y) = (i % size, i / size);
         let slope_u = (height(x + 1, y) - height(x + size - 1, y)) * 0.5 * size_px as f32;
         let slope_v = (height(x, y + 1) - height(x, y + size - 1)) * 0.5 * size_px as f32;
@@ -70,7 +73,6 @@ pub(super) fn baked_material(
         let n = glam::Vec3::new(-slope_u, slope_v, 1.0).normalize();
         [byte(0.5 * n.x + 0.5), byte(0.5 * n.y + 0.5), byte(0.5 * n.z + 0.5), 255]
     });
-    let normals = normals.collect();
     let [base, orm, normals] = [("color", base), ("orm", orm), ("normal", normals)]
         .map(|(kind, pixels)| texture(b.image(&format!("{name} {kind}"), size_px, pixels)));
     Material {
