@@ -1,0 +1,22 @@
+//! Scenes: glTF and OBJ loading, built-in scenes, cameras, camera paths, lights.
+//!
+//! [`load_source`] takes what the command line takes: a file name or `builtin:NAME?key=value`.
+//! Whatever the source, the result is a [`Scene`]: packed vertices, triangle lists, materials,
+//! images that are not yet decoded ([`texture::decode`] does that), nodes, cameras and lights.
+
+pub mod animation;
+pub mod builtin;
+pub mod camera;
+mod error;
+mod gltf;
+pub mod lights;
+mod load;
+mod model;
+mod obj;
+mod rng;
+mod tangent;
+pub mod texture;
+
+pub use error::SceneError;
+pub use load::{LoadOptions, load, load_bytes, load_source};
+pub use model::*;
