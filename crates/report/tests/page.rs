@@ -40,6 +40,7 @@ fn run() -> Run {
             ok,
             RunResult::without_figures("mesh", Status::Unavailable, "the device lacks mesh shaders"),
         ],
+        process: None,
     }
 }
 
