@@ -1039,15 +1039,16 @@ fn statistics(counts: [u64; 7]) -> Statistics {
     }
 }
 
-/// Attachments in read-only layouts are not stored: a store counts as a write.
-fn store_op(layout: vk::ImageLayout, store: bool) -> vk::AttachmentStoreOp {
+/// Attachments in read-only layouts are not stored: a store counts as a write. `mixed` is the layout in which the
+/// attachment's aspect alone is read-only.
+fn store_op(layout: vk::ImageLayout, mixed: Option<vk::ImageLayout>, store: bool) -> vk::AttachmentStoreOp {
     let read_only = [
         vk::ImageLayout::DEPTH_STENCIL_READ_ONLY_OPTIMAL,
         vk::ImageLayout::DEPTH_READ_ONLY_OPTIMAL,
         vk::ImageLayout::STENCIL_READ_ONLY_OPTIMAL,
         vk::ImageLayout::READ_ONLY_OPTIMAL,
     ];
-    match (read_only.contains(&layout), store) {
+    match (read_only.contains(&layout) || mixed == Some(layout), store) {
         (true, _) => vk::AttachmentStoreOp::NONE,
         (false, true) => vk::AttachmentStoreOp::STORE,
         (false, false) => vk::AttachmentStoreOp::DONT_CARE,
@@ -1060,7 +1061,7 @@ fn color_attachment(color: &ColorAttachment<'_>) -> vk::RenderingAttachmentInfo<
         .image_view(color.view.raw)
         .image_layout(layout)
         .load_op(color.load.op())
-        .store_op(store_op(layout, color.store));
+        .store_op(store_op(layout, None, color.store));
     if let Load::Clear(value) = color.load {
         info = info.clear_value(vk::ClearValue { color: value.raw() });
     }
@@ -1079,7 +1080,11 @@ fn depth_attachment(depth: &DepthAttachment<'_>) -> vk::RenderingAttachmentInfo<
         .image_view(depth.view.raw)
         .image_layout(depth.layout)
         .load_op(depth.load.op())
-        .store_op(store_op(depth.layout, depth.store))
+        .store_op(store_op(
+            depth.layout,
+            Some(vk::ImageLayout::DEPTH_READ_ONLY_STENCIL_ATTACHMENT_OPTIMAL),
+            depth.store,
+        ))
         .clear_value(vk::ClearValue {
             depth_stencil: vk::ClearDepthStencilValue { depth: cleared, stencil: 0 },
         })
@@ -1091,7 +1096,11 @@ fn stencil_attachment(stencil: &StencilAttachment<'_>) -> vk::RenderingAttachmen
         .image_view(stencil.view.raw)
         .image_layout(stencil.layout)
         .load_op(stencil.load.op())
-        .store_op(store_op(stencil.layout, stencil.store))
+        .store_op(store_op(
+            stencil.layout,
+            Some(vk::ImageLayout::DEPTH_ATTACHMENT_STENCIL_READ_ONLY_OPTIMAL),
+            stencil.store,
+        ))
         .clear_value(vk::ClearValue {
             depth_stencil: vk::ClearDepthStencilValue { depth: 0.0, stencil: cleared },
         })
