@@ -144,7 +144,12 @@ pub(crate) fn resolve_uri(file: &Path, uri: &str) -> Option<PathBuf> {
 }
 
 /// Decodes `%XX`; `None` where an escape is broken or the result is no UTF-8.
-pub(crate) fn percent_decode(text: &str) -> Option<String> {
+fn percent_decode(text: &str) -> Option<String> {
+    String::from_utf8(percent_decode_bytes(text)?).ok()
+}
+
+/// Decodes `%XX`; `None` where an escape is broken.
+pub(crate) fn percent_decode_bytes(text: &str) -> Option<Vec<u8>> {
     let mut out = Vec::with_capacity(text.len());
     let mut bytes = text.bytes();
     while let Some(b) = bytes.next() {
@@ -156,5 +161,5 @@ pub(crate) fn percent_decode(text: &str) -> Option<String> {
             out.push(b);
         }
     }
-    String::from_utf8(out).ok()
+    Some(out)
 }

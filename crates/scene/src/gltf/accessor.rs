@@ -216,6 +216,14 @@ impl<'a> Accessors<'a> {
         })
     }
 
+    /// Whether the bytes of an accessor are there: a buffer may be a placeholder.
+    pub(super) fn has_data(&self, index: usize) -> bool {
+        let Some(layout) = self.layouts.get(index) else { return false };
+        let sparse = layout.sparse.as_ref();
+        let views = [layout.view, sparse.map(|s| s.index_view), sparse.map(|s| s.value_view)];
+        views.into_iter().flatten().all(|v| matches!(self.views.get(v), Some(Some(_))))
+    }
+
     /// Place of an accessor for messages.
     pub(super) fn place(&self, index: usize) -> &str {
         self.layouts.get(index).map_or("accessors", |l| &l.at)

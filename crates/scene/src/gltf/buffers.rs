@@ -107,16 +107,19 @@ pub(super) fn decode_data_uri(
     let Some((header, data)) = uri["data:".len()..].split_once(',') else {
         return Err(wrong(format!("{short:?}"), "data:TYPE;base64,DATA".to_owned()));
     };
-    let Some(media_type) = header.strip_suffix(";base64") else {
-        return Err(wrong(format!("{short:?}"), "data:TYPE;base64,DATA".to_owned()));
+    let (media_type, is_base64) = match header.strip_suffix(";base64") {
+        Some(media_type) => (media_type, true),
+        None => (header, false),
     };
     let media_type = media_type.split(';').next().unwrap_or_default();
     if !media_types.contains(&media_type) {
         return Err(wrong(format!("the media type {media_type:?}"), media_types.join(" or ")));
     }
-    let data =
-        load::percent_decode(data).ok_or_else(|| wrong("a broken % escape".into(), "base64".into()))?;
-    BASE64.decode(data.trim()).map_err(|e| wrong(e.to_string(), "base64".to_owned()))
+    let data = load::percent_decode_bytes(data).ok_or_else(|| wrong("a broken % escape".into(), "%XX".into()))?;
+    if !is_base64 {
+        return Ok(data);
+    }
+    BASE64.decode(data).map_err(|e| wrong(e.to_string(), "base64".to_owned()))
 }
 
 fn read_uri(file: &Path, at: &str, uri: &str, media_types: &[&str]) -> Result<Vec<u8>, SceneError> {
@@ -161,7 +164,7 @@ fn load_view<'a>(
         return Err(SceneError::invalid(file, format!("{at}.byteLength"), "0", "1 or more"));
     }
     if let Some(stride) = view.byte_stride.map(|s| s.0)
-        && !(4..=252).contains(&stride)
+        && !((4..=252).contains(&stride) && stride.is_multiple_of(4))
     {
         let expected = "4 to 252, a multiple of 4";
         return Err(SceneError::invalid(file, format!("{at}.byteStride"), stride.to_string(), expected));

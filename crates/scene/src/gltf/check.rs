@@ -54,6 +54,11 @@ fn check_scenes_and_nodes(file: &Path, root: &Root) -> Result<(), SceneError> {
         root.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref()).map_or(0, |l| l.lights.len());
     for (i, node) in root.nodes.iter().enumerate() {
         let at = |property: &str| format!("nodes[{i}].{property}");
+        let has_trs = node.translation.is_some() || node.rotation.is_some() || node.scale.is_some();
+        if node.matrix.is_some() && has_trs {
+            let (found, expected) = ("a matrix beside translation, rotation or scale", "one form of transform");
+            return Err(SceneError::invalid(file, at("matrix"), found, expected));
+        }
         if let Some(mesh) = &node.mesh {
             resolve(file, || at("mesh"), mesh, root.meshes.len())?;
         }
@@ -193,6 +198,18 @@ fn check_primitive(
         let unsigned = matches!(l.component, ComponentType::U8 | ComponentType::U16 | ComponentType::U32);
         if l.shape != Type::Scalar || !unsigned || l.normalized {
             return Err(SceneError::invalid(file, at, form(l), "SCALAR of unsigned integers"));
+        }
+    }
+    for semantic in primitive.attributes.keys() {
+        let partner = match semantic {
+            Checked::Valid(Semantic::Joints(set)) => Semantic::Weights(*set),
+            Checked::Valid(Semantic::Weights(set)) => Semantic::Joints(*set),
+            _ => continue,
+        };
+        let name = partner.to_string();
+        if !primitive.attributes.contains_key(&Checked::Valid(partner)) {
+            let expected = "JOINTS_n and WEIGHTS_n together";
+            return Err(SceneError::invalid(file, format!("{at}.attributes"), format!("no {name}"), expected));
         }
     }
     let mut vertices: Option<usize> = None;

@@ -104,8 +104,9 @@ fn split_glb<'a>(file: &Path, bytes: &'a [u8]) -> Result<(&'a [u8], Option<&'a [
     Ok((json, bin))
 }
 
-/// Parses JSON into the typed document. The typed reader takes no integer that is written as a
-/// float (`1.0`), which glTF allows: such a file is read by way of untyped JSON.
+/// Parses JSON into the typed document. The typed reader is stricter than glTF in a few points
+/// (an integer may be written `1.0`, extras may be anything, a scene may have no nodes): what it
+/// refuses is read by way of untyped JSON.
 fn parse_json(file: &Path, text: &[u8]) -> Result<Root, SceneError> {
     let wrong = |e: &json::Error| SceneError::invalid(file, "JSON", e.to_string(), "glTF 2.0");
     if text.starts_with(b"\xEF\xBB\xBF") {
@@ -120,6 +121,8 @@ fn parse_json(file: &Path, text: &[u8]) -> Result<Root, SceneError> {
         return Err(SceneError::invalid(file, "JSON", kind_of(&value), "an object"));
     }
     whole_floats_to_integers(&mut value);
+    drop_extras(&mut value);
+    add_missing_scene_nodes(&mut value);
     drop_untargeted_channels(&mut value);
     json::deserialize::from_value(value).map_err(|_| wrong(&first_error))
 }
@@ -147,6 +150,25 @@ fn whole_floats_to_integers(value: &mut Value) {
         Value::Array(items) => items.iter_mut().for_each(whole_floats_to_integers),
         Value::Object(map) => map.values_mut().for_each(whole_floats_to_integers),
         _ => {}
+    }
+}
+
+/// Application data may be any JSON; nothing here reads it.
+fn drop_extras(value: &mut Value) {
+    match value {
+        Value::Array(items) => items.iter_mut().for_each(drop_extras),
+        Value::Object(map) => {
+            map.remove("extras");
+            map.values_mut().for_each(drop_extras);
+        }
+        _ => {}
+    }
+}
+
+fn add_missing_scene_nodes(root: &mut Value) {
+    let scenes = root.get_mut("scenes").and_then(Value::as_array_mut);
+    for scene in scenes.into_iter().flatten().filter_map(Value::as_object_mut) {
+        scene.entry("nodes").or_insert_with(|| Value::Array(Vec::new()));
     }
 }
 

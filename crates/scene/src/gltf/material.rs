@@ -201,8 +201,8 @@ impl Converter<'_> {
         let texture = &self.root.textures[u.texture.value()];
         let image = texture.source.value();
         if image >= self.root.images.len() {
-            let (found, expected) = ("a texture without a source", "a PNG or JPEG image");
-            return Err(SceneError::invalid(self.file, at(), found, expected));
+            self.warnings.push(format!("{}: a texture without a PNG or JPEG source is left out", at()));
+            return Ok(None);
         }
         let uv_transform = u.transform.as_ref().map_or(IDENTITY, matrix);
         if !uv_transform.iter().flatten().all(|v| v.is_finite()) {

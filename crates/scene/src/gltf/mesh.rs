@@ -57,6 +57,15 @@ struct Job<'a> {
 struct Vertices {
     positions_os: Vec<[f32; 3]>,
     attributes: Vec<VertexAttributes>,
+    /// Vertices with a normal of length 0, to be made from the faces.
+    zero_normals: Vec<u32>,
+}
+
+/// Where packed vertices are in the scene.
+#[derive(Clone)]
+struct Placed {
+    range: std::ops::Range<u32>,
+    zero_normals: Vec<u32>,
 }
 
 /// Converts variants into `scene` and returns, for each, the range of its scene meshes.
@@ -82,11 +91,16 @@ pub(super) fn convert(
         if leftover {
             scene.warnings.push(format!("{}: indices left over after the last triangle are ignored", job.at));
         }
-        let range = match (vertices, job.shared) {
+        let placed = match (vertices, job.shared) {
             (Some(vertices), _) => append(scene, vertices),
             (None, Some(shared)) => bases[shared].clone(),
-            (None, None) => 0..0,
+            (None, None) => Placed { range: 0..0, zero_normals: Vec::new() },
         };
+        let Placed { range, zero_normals } = placed;
+        if !zero_normals.is_empty() {
+            scene.warnings.push(format!("{}: normals of length 0 are made from the faces", job.at));
+            fill_zero_normals(scene, &range, &zero_normals, &indices);
+        }
         let mut bounds_os = Aabb::EMPTY;
         for &p in &scene.positions_os[range.start as usize..range.end as usize] {
             bounds_os.extend(p.into());
@@ -113,7 +127,27 @@ pub(super) fn convert(
         .collect())
 }
 
-fn append(scene: &mut Scene, vertices: Vertices) -> std::ops::Range<u32> {
+/// Gives vertices without a normal the mean normal of their faces, weighted by area.
+fn fill_zero_normals(scene: &mut Scene, range: &std::ops::Range<u32>, vertices: &[u32], indices: &[u32]) {
+    let mut sums = vec![Vec3::ZERO; range.len()];
+    let positions_os = &scene.positions_os[range.start as usize..range.end as usize];
+    for t in indices.chunks_exact(3) {
+        let [a, b, c] = [t[0], t[1], t[2]].map(|i| Vec3::from(positions_os[i as usize]));
+        let normal = (b - a).cross(c - a);
+        t.iter().for_each(|&i| sums[i as usize] += normal);
+    }
+    let attributes = &mut scene.attributes[range.start as usize..range.end as usize];
+    for &vertex in vertices {
+        let sum = sums[vertex as usize];
+        if sum.is_finite() && sum != Vec3::ZERO {
+            let packed = VertexAttributes::pack(sum, Vec3::X, 1.0, Vec2::ZERO, Vec2::ZERO, [1.0; 4]);
+            attributes[vertex as usize].normal_os_oct = packed.normal_os_oct;
+        }
+    }
+}
+
+fn append(scene: &mut Scene, vertices: Vertices) -> Placed {
+    let zero_normals = vertices.zero_normals;
     let start = scene.positions_os.len() as u32;
     // the first stream is taken over as it is: no copy where there is only one
     if scene.positions_os.is_empty() {
@@ -123,7 +157,24 @@ fn append(scene: &mut Scene, vertices: Vertices) -> std::ops::Range<u32> {
         scene.positions_os.extend_from_slice(&vertices.positions_os);
         scene.attributes.extend_from_slice(&vertices.attributes);
     }
-    start..scene.positions_os.len() as u32
+    Placed { range: start..scene.positions_os.len() as u32, zero_normals }
+}
+
+/// Checks indices and positions of meshes that nothing draws: a broken file is refused whether or
+/// not its broken part shows. Primitives without data are passed over.
+pub(super) fn check_unused(accessors: &Accessors, root: &Root, variants: &[Variant]) -> Result<(), SceneError> {
+    let mut used = vec![false; root.meshes.len()];
+    variants.iter().for_each(|v| used[v.mesh] = true);
+    let unused = root.meshes.iter().zip(used).filter(|(_, used)| !used);
+    unused.flat_map(|(mesh, _)| &mesh.primitives).try_for_each(|primitive| {
+        let positions = primitive.attributes.get(&Checked::Valid(Semantic::Positions)).map(|a| a.value());
+        let Some(positions) = positions.filter(|&p| accessors.has_data(p)) else { return Ok(()) };
+        accessors.floats::<3>(positions, 3, 0.0)?;
+        if primitive.indices.is_some_and(|i| accessors.has_data(i.value())) {
+            corners(accessors, primitive, accessors.layout(positions)?.count)?;
+        }
+        Ok(())
+    })
 }
 
 /// Lists the primitives to convert and, for each variant, how many there are. Materials that
@@ -277,7 +328,9 @@ impl Unpacked {
                 VertexAttributes::pack(normal_os, tangent.truncate(), tangent.w, uv(0), uv(1), color)
             })
             .collect();
-        Vertices { positions_os: self.positions_os, attributes }
+        let zero = self.normals_os.iter().zip(0..).filter(|(n, _)| **n == [0.0; 3]);
+        let zero_normals = zero.map(|(_, i)| i).collect();
+        Vertices { positions_os: self.positions_os, attributes, zero_normals }
     }
 }
 
@@ -327,21 +380,32 @@ fn triangle_list(
     primitive: &Primitive,
     vertex_count: usize,
 ) -> Result<(Vec<u32>, bool), SceneError> {
-    let corners: Vec<u32> = match primitive.indices {
-        None => (0..vertex_count as u32).collect(),
+    Ok(to_triangles(corners(accessors, primitive, vertex_count)?, primitive.mode))
+}
+
+/// The primitive's indices, each below the number of vertices; all vertices where it has none.
+fn corners(accessors: &Accessors, primitive: &Primitive, vertex_count: usize) -> Result<Vec<u32>, SceneError> {
+    match primitive.indices {
+        None => Ok((0..vertex_count as u32).collect()),
         Some(accessor) => {
             let corners = accessors.indices(accessor.value())?;
-            if corners.iter().max().is_some_and(|&m| m as usize >= vertex_count)
-                && let Some(k) = corners.iter().position(|&i| i as usize >= vertex_count)
+            // the largest number of each width would restart a strip (glTF 2.0, 3.7.2.1)
+            let restart = match accessors.layout(accessor.value())?.component.size() {
+                1 => usize::from(u8::MAX),
+                2 => usize::from(u16::MAX),
+                _ => u32::MAX as usize,
+            };
+            let limit = vertex_count.min(restart);
+            if corners.iter().max().is_some_and(|&m| m as usize >= limit)
+                && let Some(k) = corners.iter().position(|&i| i as usize >= limit)
             {
                 let at = format!("{} element {k}", accessors.place(accessor.value()));
-                let expected = format!("an index below {vertex_count}, the number of vertices");
+                let expected = format!("an index below {limit}, for {vertex_count} vertices");
                 return Err(SceneError::invalid(accessors.file, at, corners[k].to_string(), expected));
             }
-            corners
+            Ok(corners)
         }
-    };
-    Ok(to_triangles(corners, primitive.mode))
+    }
 }
 
 /// Turns strips and fans into lists (glTF 2.0, 3.7.2.1, with its orders, which keep the winding).
