@@ -533,7 +533,7 @@ fn curtains(d: Detail, phase: f64, rod_y: f64) -> MeshData {
             let x = side * (1.16 - width * s);
             let folds = TAU * (5.0 * s + 0.3 * (phase + 2.0 * t).sin());
             let depth = (0.05 + 0.05 * t) * (1.0 - 0.45 * gather);
-            let z = depth * folds.sin() + 0.02 * (3.0 * folds + phase).sin() * t + 0.06 * gather;
+            let z = depth * folds.sin() + 0.012 * (2.0 * folds + phase).sin() * t + 0.06 * gather;
             let y = rod_y - (rod_y - 0.05) * t * drop - 0.02 * (PI * s).sin() * t;
             DVec3::new(x, y, z)
         };
