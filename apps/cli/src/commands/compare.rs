@@ -206,22 +206,32 @@ fn picture(measured: &Measured, truth: &Rgba8Image) -> Result<Option<Picture>, F
     }))
 }
 
-/// The exit code's reason: a technique that broke off or whose image is off.
+/// The exit code's reason: techniques that broke off or whose images are off.
 pub fn verdict(run: &Run) -> Result<(), Failure> {
-    let failed: Vec<String> = run
-        .results
+    let failed: Vec<&RunResult> =
+        run.results.iter().filter(|result| result.status == Status::Failed).collect();
+    let Some(first) = failed.first() else { return Ok(()) };
+    let names: Vec<&str> = failed.iter().map(|result| result.technique.as_str()).collect();
+    let reason = first.reason.as_deref().unwrap_or("no reason given");
+    Err(Failure::Failed(match names.len() {
+        1 => format!("{} failed: {reason}", names[0]),
+        count => format!("{count} techniques failed: {}; {}: {reason}", names.join(", "), names[0]),
+    }))
+}
+
+/// A line for each technique with something to say.
+fn reasons(run: &Run) -> String {
+    run.results
         .iter()
-        .filter(|result| result.status == Status::Failed)
-        .map(|result| format!("{}: {}", result.technique, result.reason.as_deref().unwrap_or("failed")))
-        .collect();
-    if failed.is_empty() { Ok(()) } else { Err(Failure::Failed(failed.join("; "))) }
+        .filter_map(|result| Some(format!("{}: {}\n", result.technique, result.reason.as_ref()?)))
+        .collect()
 }
 
 /// What the terminal shows: a line of facts, the techniques, their passes.
 pub fn tables(run: &Run) -> String {
     let settings = &run.settings;
     format!(
-        "{} ({}), driver {}\n{}: {} triangles, {} draws, {} lights; {}×{}, {} sample(s); median of {} frame(s)\n\n{}\n{}\n",
+        "{} ({}), driver {}\n{}: {} triangles, {} draws, {} lights; {}×{}, {} sample(s); median of {} frame(s)\n\n{}\n{}{}\n",
         run.device.name,
         run.device.kind,
         run.device.driver,
@@ -234,7 +244,12 @@ pub fn tables(run: &Run) -> String {
         settings.samples,
         settings.frames,
         technique_table(run),
-        pass_table(run)
+        reasons(run),
+        if run.results.iter().all(|result| result.passes.is_empty()) {
+            String::new()
+        } else {
+            pass_table(run).to_string()
+        }
     )
 }
 
@@ -246,16 +261,14 @@ fn technique_table(run: &Run) -> Table {
     for result in &run.results {
         let dash = || "–".to_owned();
         let (frame, memory, difference) = (result.frame_ms, result.memory.as_ref(), result.difference);
-        let status = match (result.status, &result.reason) {
-            (Status::Ok, _) => "ok".to_owned(),
-            (Status::Unavailable, reason) => {
-                format!("unavailable: {}", reason.as_deref().unwrap_or_default())
-            }
-            (Status::Failed, reason) => format!("failed: {}", reason.as_deref().unwrap_or_default()),
+        let status = match result.status {
+            Status::Ok => "ok",
+            Status::Unavailable => "unavailable",
+            Status::Failed => "failed",
         };
         table.add_row([
             result.technique.clone(),
-            status,
+            status.to_owned(),
             frame.map_or_else(dash, |f| ms_text(f.median)),
             frame.map_or_else(dash, |f| format!("{} – {}", ms_text(f.min), ms_text(f.max))),
             result.record_ms.map_or_else(dash, |r| ms_text(r.median)),
