@@ -19,9 +19,12 @@ layout(set = 1, binding = 0) uniform sampler2DArray srgb_textures[12];
 layout(set = 1, binding = 1) uniform sampler2DArray normal_textures[8];
 layout(set = 1, binding = 2) uniform sampler2DArray data_textures[8];
 
-layout(set = 0, binding = 2, scalar) readonly buffer Materials {
-    MaterialData materials[];
-};
+layout(set = 0, binding = 2) uniform utexture2D material_data;
+
+MaterialData load_material(uint index) {
+    return load_material_from(material_data, index);
+}
+
 layout(set = 0, binding = 3, scalar) readonly buffer UvTransforms {
     vec4 uv_transforms[];   // two rows (xyz) a transform
 };

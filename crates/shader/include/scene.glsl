@@ -1,8 +1,10 @@
 // The scene's records: draws and materials.
 //
-// Twins: DrawData and MaterialData in crates/shader/src/structs.rs, checked at build.
+// They stand in RGBA32UI images, rows of 1,024 texels: a texel comes with one vector load where lavapipe reads a buffer word
+// by word and lane by lane. Twins: DrawData and MaterialData in crates/shader/src/structs.rs, whose tests hold the texels.
 #ifndef AFTERLIGHT_SCENE
 #define AFTERLIGHT_SCENE
+#extension GL_EXT_samplerless_texture_functions : require
 #include "packing.glsl"
 
 // A draw is at most 1,024 triangles of one instance, so that a triangle's number within its draw takes ten bits.
@@ -46,6 +48,25 @@ const uint MATERIAL_DOUBLE_SIDED = 2u;
 // A degenerate transform may leave no direction: zero then, not NaN.
 vec3 unit_or_zero(vec3 v) {
     return v * inversesqrt(max(dot(v, v), 1e-30));
+}
+
+// Four texels a draw.
+DrawData load_draw(utexture2D image, uint index) {
+    ivec2 at = ivec2((index & 255u) * 4u, index >> 8);
+    uvec4 tail = texelFetch(image, at + ivec2(3, 0), 0);
+    return DrawData(uintBitsToFloat(texelFetch(image, at, 0)), uintBitsToFloat(texelFetch(image, at + ivec2(1, 0), 0)),
+                    uintBitsToFloat(texelFetch(image, at + ivec2(2, 0), 0)), tail.x, tail.y, tail.z, tail.w);
+}
+
+// Eight texels a material, five of them used.
+MaterialData load_material_from(utexture2D image, uint index) {
+    ivec2 at = ivec2((index & 127u) * 8u, index >> 7);
+    vec4 emission = uintBitsToFloat(texelFetch(image, at + ivec2(1, 0), 0));
+    vec4 factors = uintBitsToFloat(texelFetch(image, at + ivec2(2, 0), 0));
+    uvec4 a = texelFetch(image, at + ivec2(3, 0), 0);
+    uvec4 b = texelFetch(image, at + ivec2(4, 0), 0);
+    return MaterialData(uintBitsToFloat(texelFetch(image, at, 0)), emission.xyz, emission.w, factors.x, factors.y, factors.z,
+                        factors.w, a.x, a.y, a.z, a.w, b.x, b.y, b.z, b.w);
 }
 
 // Normal matrix times n: the cofactor matrix, turned where the draw is mirrored, so that an outward normal stays one.

@@ -7,24 +7,21 @@
 #include "frame.glsl"
 #include "material.glsl"
 
-struct LightData {
-    vec3 position_ws;
-    float range_m;              // infinity where it has no end
-    vec3 intensity;             // candela, or lux where directional
-    uint kind;                  // LIGHT_*
-    vec3 direction_ws;          // unit, in which it shines
-    float inverse_range_sq;     // 1/m^2, 0 where it has no end
-    float spot_scale;           // angular falloff: clamp(cos * scale + offset)^2
-    float spot_offset;
-    uvec2 _padding;
-};
+// A light is four texels of an RGBA32UI image, 256 lights a row. An image and not a buffer, since a texel comes with one
+// vector load where lavapipe reads a buffer word by word and lane by lane.
+//
+//   0  position in world space, m; 1 / range^2, 1/m^2, 0 where it has no end
+//   1  intensity, candela, or lux where directional; the kind
+//   2  unit direction in which it shines; range, m
+//   3  spot: scale and offset of the angular falloff clamp(cos * scale + offset)^2; unused; unused
+layout(set = 0, binding = 4) uniform utexture2D light_data;
 const uint LIGHT_POINT = 0u;
 const uint LIGHT_SPOT = 1u;
 const uint LIGHT_DIRECTIONAL = 2u;
 
-layout(set = 0, binding = 4, scalar) readonly buffer Lights {
-    LightData lights[];
-};
+vec4 light_texel(uint index, uint texel) {
+    return uintBitsToFloat(texelFetch(light_data, ivec2((index & 255u) * 4u + texel, index >> 8), 0));
+}
 
 // 1 where every light is a point light, so that the code for the others goes.
 layout(constant_id = 6) const uint ONLY_POINT_LIGHTS = 0u;
@@ -83,27 +80,32 @@ vec3 reflectance(ShadingPoint p, vec3 l) {
 
 // Radiance towards the eye that light number `index` causes; nothing beyond its range.
 vec3 light_radiance(ShadingPoint p, uint index) {
-    vec3 to_light = lights[index].position_ws - p.position_ws;
+    vec4 place = light_texel(index, 0u);
+    vec3 to_light = place.xyz - p.position_ws;
     float distance_sq = max(dot(to_light, to_light), 1e-8);
-    float t = distance_sq * lights[index].inverse_range_sq;
-    bool directional = ONLY_POINT_LIGHTS == 0u && lights[index].kind == LIGHT_DIRECTIONAL;
-    if (t >= 1.0 && !directional) {
+    // t = (d / range)^2; a directional light has no end, so t is 0
+    float t = distance_sq * place.w;
+    if (t >= 1.0) {
         return vec3(0.0);
     }
+    uvec4 packed = texelFetch(light_data, ivec2((index & 255u) * 4u + 1u, index >> 8), 0);
+    vec3 intensity = uintBitsToFloat(packed.xyz);
+    uint kind = packed.w;
     vec3 l = to_light * inversesqrt(distance_sq);
     // Inverse square with glTF's window: (1 - (d / range)^4) / d^2
     float attenuation = (1.0 - t * t) / distance_sq;
-    if (ONLY_POINT_LIGHTS == 0u && lights[index].kind != LIGHT_POINT) {
-        vec3 direction = lights[index].direction_ws;
-        if (directional) {
+    if (ONLY_POINT_LIGHTS == 0u && kind != LIGHT_POINT) {
+        vec3 direction = light_texel(index, 2u).xyz;
+        if (kind == LIGHT_DIRECTIONAL) {
             l = -direction;
             attenuation = 1.0;
         } else {
-            float angular = clamp(dot(-l, direction) * lights[index].spot_scale + lights[index].spot_offset, 0.0, 1.0);
+            vec4 spot = light_texel(index, 3u);
+            float angular = clamp(dot(-l, direction) * spot.x + spot.y, 0.0, 1.0);
             attenuation *= angular * angular;
         }
     }
-    return lights[index].intensity * attenuation * reflectance(p, l);
+    return intensity * attenuation * reflectance(p, l);
 }
 
 // Radiance that needs no light: emission and the constant ambient term, or the base colour of an unlit surface. A white

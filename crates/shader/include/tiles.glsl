@@ -20,10 +20,13 @@ const uint TILE_THREADS = TILE_SIZE * TILE_SIZE;
 const uint BATCH_LIGHTS = 1024u;
 const uint BATCH_WORDS = BATCH_LIGHTS / 32u;
 
-// Centre and range of every light: what culling reads, 16 bytes instead of a whole light. Range infinite: never culled.
-layout(set = 0, binding = 5, scalar) readonly buffer LightSpheres {
-    vec4 light_spheres[];
-};
+// Centre and range of every light, one texel of RGBA32F each, 1,024 a row: what culling reads, a quarter of a light.
+// Range infinite: never culled.
+layout(set = 0, binding = 5) uniform texture2D light_spheres;
+
+vec4 light_sphere(uint index) {
+    return texelFetch(light_spheres, ivec2(index & 1023u, index >> 10), 0);
+}
 
 shared uint tile_nearest;   // bits of non-negative floats order as unsigned integers
 shared uint tile_farthest;
@@ -88,7 +91,7 @@ void tile_cull(TileFrustum t, uint first) {
     barrier();
     uint end = min(first + BATCH_LIGHTS, frame.light_count);
     for (uint i = first + gl_LocalInvocationIndex; i < end; i += TILE_THREADS) {
-        if (tile_touches(t, light_spheres[i])) {
+        if (tile_touches(t, light_sphere(i))) {
             atomicOr(tile_lights[(i - first) >> 5], 1u << ((i - first) & 31u));
         }
     }

@@ -9,9 +9,7 @@
 #include "frame.glsl"
 #include "material.glsl"
 
-layout(set = 0, binding = 1, scalar) readonly buffer Draws {
-    DrawData draws[];
-};
+layout(set = 0, binding = 1) uniform utexture2D draw_data;
 layout(set = 0, binding = 6, scalar) readonly buffer Positions {
     float positions_os[];       // three a vertex
 };
@@ -72,7 +70,7 @@ vec2 load_uv(uint first, uint offset) {
 }
 
 SurfacePoint triangle_point(uint id, vec2 ndc, out uint material) {
-    DrawData d = draws[id >> TRIANGLE_BITS];
+    DrawData d = load_draw(draw_data, id >> TRIANGLE_BITS);
     material = d.material;
     uint first = d.first_index + (id & ((1u << TRIANGLE_BITS) - 1u)) * 3u;
     uvec3 v = d.first_vertex + uvec3(indices[first], indices[first + 1u], indices[first + 2u]);

@@ -29,7 +29,8 @@ shader_struct! {
         pub unbounded_light_count: u32,
     }
 
-    /// One draw: at most 1,024 triangles of one instance (`include/scene.glsl`).
+    /// One draw: at most 1,024 triangles of one instance; four texels, and the vertex stream of instances
+    /// (`include/scene.glsl`).
     pub struct DrawData {
         /// First row of the matrix object → world.
         pub object_row0: [f32; 4],
@@ -47,7 +48,7 @@ shader_struct! {
         pub flags: u32,
     }
 
-    /// A material (`include/scene.glsl`); slots as `TextureSlot` packs them.
+    /// A material: five texels of an RGBA32UI image (`include/scene.glsl`).
     pub struct MaterialData {
         /// Linear colour and alpha.
         pub base_color_factor: [f32; 4],
@@ -81,20 +82,20 @@ shader_struct! {
         pub _padding: u32,
     }
 
-    /// A light (`include/shading.glsl`).
+    /// A light: four texels of an RGBA32UI image (`include/shading.glsl`).
     pub struct LightData {
         /// World space, metres.
         pub position_ws: [f32; 3],
-        /// Metres; infinite where it has no end.
-        pub range_m: f32,
+        /// 1 / range², 0 where it has no end.
+        pub inverse_range_sq: f32,
         /// Candela, or lux where directional; linear colour.
         pub intensity: [f32; 3],
         /// 0 point, 1 spot, 2 directional.
         pub kind: u32,
         /// Unit direction in which it shines.
         pub direction_ws: [f32; 3],
-        /// 1 / range², 0 where it has no end.
-        pub inverse_range_sq: f32,
+        /// Metres; infinite where it has no end.
+        pub range_m: f32,
         /// Scale of the cone's falloff.
         pub spot_scale: f32,
         /// Offset of the cone's falloff.
@@ -119,3 +120,35 @@ pub const NO_TEXTURE: u32 = u32::MAX;
 /// Bits of a triangle's number within its draw, in a 32-bit triangle ID; the draw's number takes the others.
 /// `TRIANGLE_BITS` in `include/scene.glsl`.
 pub const TRIANGLE_BITS: u32 = 10;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use core::mem::offset_of;
+
+    /// Records that shaders read as texels: each texel's first field, as `include/scene.glsl` and `include/shading.glsl`
+    /// take them apart.
+    #[test]
+    fn records_lie_in_texels_as_shaders_read_them() {
+        assert_eq!(size_of::<DrawData>(), 4 * 16);
+        assert_eq!(offset_of!(DrawData, object_row1), 16);
+        assert_eq!(offset_of!(DrawData, object_row2), 2 * 16);
+        assert_eq!(offset_of!(DrawData, first_index), 3 * 16);
+        assert_eq!(offset_of!(DrawData, flags), 3 * 16 + 12);
+        assert_eq!(size_of::<MaterialData>(), 5 * 16);
+        assert_eq!(offset_of!(MaterialData, emissive_factor), 16);
+        assert_eq!(offset_of!(MaterialData, alpha_cutoff), 16 + 12);
+        assert_eq!(offset_of!(MaterialData, metallic_factor), 2 * 16);
+        assert_eq!(offset_of!(MaterialData, occlusion_strength), 2 * 16 + 12);
+        assert_eq!(offset_of!(MaterialData, flags), 3 * 16);
+        assert_eq!(offset_of!(MaterialData, metallic_roughness_slot), 3 * 16 + 12);
+        assert_eq!(offset_of!(MaterialData, normal_slot), 4 * 16);
+        assert_eq!(offset_of!(MaterialData, emissive_slot), 4 * 16 + 8);
+        assert_eq!(size_of::<LightData>(), 4 * 16);
+        assert_eq!(offset_of!(LightData, inverse_range_sq), 12);
+        assert_eq!(offset_of!(LightData, intensity), 16);
+        assert_eq!(offset_of!(LightData, kind), 16 + 12);
+        assert_eq!(offset_of!(LightData, direction_ws), 2 * 16);
+        assert_eq!(offset_of!(LightData, spot_scale), 3 * 16);
+    }
+}

@@ -211,7 +211,10 @@ mod tests {
         assert_eq!(forward(&w, 3.0), Cost { cmd: 30.0, proc: 250.0, mem: 0.0, band: 550.0 });
         assert_eq!(depth_prepass(&w), Cost { cmd: 20.0, proc: 320.0, mem: 0.0, band: 730.0 });
         assert_eq!(deferred(&w), Cost { cmd: 13.0, proc: 144.0, mem: 160.0, band: 600.0 + 224.0 + 120.0 });
-        assert_eq!(tiled_deferred(&w), Cost { cmd: 13.0, proc: 144.0, mem: 120.0, band: 600.0 + 25.0 + 167.0 });
+        assert_eq!(
+            tiled_deferred(&w),
+            Cost { cmd: 13.0, proc: 144.0, mem: 120.0, band: 600.0 + 25.0 + 167.0 }
+        );
         assert_eq!(
             visibility_buffer(&w),
             Cost { cmd: 15.0, proc: 100.0 + 24.0 + 70.0, mem: 120.0, band: 300.0 + 4.0 + 25.0 + 347.0 }

@@ -64,12 +64,19 @@ impl DrawList {
     }
 
     /// Chooses and orders the draws for a view and writes the commands.
-    pub fn update(&mut self, scene: &SceneGpu, clip_from_world: Mat4, eye_ws: Vec3) -> Result<(), gpu::GpuError> {
+    pub fn update(
+        &mut self,
+        scene: &SceneGpu,
+        clip_from_world: Mat4,
+        eye_ws: Vec3,
+    ) -> Result<(), gpu::GpuError> {
         let frustum = Frustum::new(clip_from_world);
         let mut counts = [0u32; BUCKETS];
         for (bucket, visible) in self.visible.iter_mut().enumerate() {
             let (first, end) = (scene.bucket_first[bucket], scene.bucket_first[bucket + 1]);
-            let in_view = |draw: &u32| !self.options.cull || frustum.touches(&scene.draw_infos[*draw as usize].bounds_ws);
+            let in_view = |draw: &u32| {
+                !self.options.cull || frustum.touches(&scene.draw_infos[*draw as usize].bounds_ws)
+            };
             let mut keyed: Vec<(f32, u32)> = (first..end)
                 .filter(in_view)
                 .map(|draw| (distance_sq(&scene.draw_infos[draw as usize].bounds_ws, eye_ws), draw))

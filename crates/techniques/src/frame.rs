@@ -3,9 +3,7 @@
 use afterlight_graph::{BufferHandle, Graph, ImageHandle, ImageInfo, gpu::vk};
 use afterlight_shader::Shader;
 
-use crate::{
-    SHADERS, error::TechniqueError, light_list::LightList, params::Params, scene_gpu::SceneGpu,
-};
+use crate::{SHADERS, error::TechniqueError, light_list::LightList, params::Params, scene_gpu::SceneGpu};
 
 /// A frame to be recorded: the scene on the device, its buffers imported into the graph, sizes and parameters.
 pub struct Frame<'a> {
@@ -33,10 +31,11 @@ pub struct Frame<'a> {
 pub(crate) struct FrameBuffers {
     pub frame: BufferHandle,
     pub draws: BufferHandle,
-    pub materials: BufferHandle,
+    pub draw_data: ImageHandle,
+    pub materials: ImageHandle,
     pub uv_transforms: BufferHandle,
-    pub lights: BufferHandle,
-    pub light_spheres: BufferHandle,
+    pub lights: ImageHandle,
+    pub light_spheres: ImageHandle,
     pub positions: BufferHandle,
     pub attributes: BufferHandle,
     pub indices: BufferHandle,
@@ -98,11 +97,11 @@ impl Frame<'_> {
     pub fn bind_scene(&self, pass: &mut impl Slots) {
         let b = &self.buffers;
         pass.read_buffer("FrameBlock", &b.frame);
-        pass.read_buffer("Draws", &b.draws);
-        pass.read_buffer("Materials", &b.materials);
+        pass.read_image("draw_data", &b.draw_data);
+        pass.read_image("material_data", &b.materials);
         pass.read_buffer("UvTransforms", &b.uv_transforms);
-        pass.read_buffer("Lights", &b.lights);
-        pass.read_buffer("LightSpheres", &b.light_spheres);
+        pass.read_image("light_data", &b.lights);
+        pass.read_image("light_spheres", &b.light_spheres);
         pass.read_buffer("Positions", &b.positions);
         pass.read_buffer("Attributes", &b.attributes);
         pass.read_buffer("Indices", &b.indices);

@@ -1,17 +1,17 @@
 //! Lights as shaders read them.
 
-use afterlight_graph::gpu;
+use afterlight_graph::gpu::{self, vk};
 use afterlight_scene::{Light, LightKind};
 use afterlight_shader::structs::LightData;
 
-use crate::scene_gpu::upload_slice;
+use crate::scene_gpu::record_image;
 
 /// Lights on the device: those without an end first, so that techniques with light volumes can tell them apart.
 pub struct LightList {
-    /// One record a light.
-    pub(crate) data: gpu::Buffer,
-    /// Centre and range a light, what culling reads.
-    pub(crate) spheres: gpu::Buffer,
+    /// Four texels a light.
+    pub(crate) data: gpu::Image,
+    /// Centre and range of each light, one texel, what culling reads.
+    pub(crate) spheres: gpu::Image,
     /// Number of lights.
     pub count: u32,
     /// Number of lights without an end, first in the list.
@@ -27,17 +27,34 @@ impl LightList {
     ///
     /// # Errors
     /// Of the device.
-    pub fn new(device: &gpu::Device, uploader: &mut gpu::Uploader, lights: &[Light]) -> Result<Self, gpu::GpuError> {
+    pub fn new(
+        device: &gpu::Device,
+        uploader: &mut gpu::Uploader,
+        lights: &[Light],
+    ) -> Result<Self, gpu::GpuError> {
         let mut lights = lights.to_vec();
         lights.sort_by_key(|light| !is_unbounded(light));
         let data: Vec<LightData> = lights.iter().map(light_data).collect();
         let spheres: Vec<[f32; 4]> = lights
             .iter()
-            .map(|l| if is_unbounded(l) { [0.0, 0.0, 0.0, f32::INFINITY] } else { l.position_ws.extend(l.range_m).into() })
+            .map(|l| {
+                if is_unbounded(l) {
+                    [0.0, 0.0, 0.0, f32::INFINITY]
+                } else {
+                    l.position_ws.extend(l.range_m).into()
+                }
+            })
             .collect();
         Ok(Self {
-            data: upload_slice(device, uploader, "lights", &data)?,
-            spheres: upload_slice(device, uploader, "light spheres", &spheres)?,
+            data: record_image(device, uploader, "lights", &data, 4, vk::Format::R32G32B32A32_UINT)?,
+            spheres: record_image(
+                device,
+                uploader,
+                "light spheres",
+                &spheres,
+                1,
+                vk::Format::R32G32B32A32_SFLOAT,
+            )?,
             count: lights.len() as u32,
             unbounded_count: lights.iter().filter(|l| is_unbounded(l)).count() as u32,
             only_points: lights.iter().all(|l| l.kind == LightKind::Point),

@@ -22,6 +22,9 @@ use crate::{
     volumes,
 };
 
+/// Layout in which uploads leave images.
+const UPLOADED: vk::ImageLayout = vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL;
+
 /// What a frame looks like, whatever the technique.
 #[derive(Clone, Debug)]
 pub struct Settings {
@@ -210,10 +213,11 @@ impl Renderer {
         FrameBuffers {
             frame: graph.import_buffer("frame constants", constants),
             draws: graph.import_buffer("scene draws", &s.draws),
-            materials: graph.import_buffer("scene materials", &s.materials),
+            draw_data: graph.import_image("scene draw records", &s.draw_data, UPLOADED),
+            materials: graph.import_image("scene materials", &s.materials, UPLOADED),
             uv_transforms: graph.import_buffer("scene texture transforms", &s.uv_transforms),
-            lights: graph.import_buffer("lights", &self.lights.data),
-            light_spheres: graph.import_buffer("light spheres", &self.lights.spheres),
+            lights: graph.import_image("lights", &self.lights.data, UPLOADED),
+            light_spheres: graph.import_image("light spheres", &self.lights.spheres, UPLOADED),
             positions: graph.import_buffer("scene positions", &s.positions),
             attributes: graph.import_buffer("scene attributes", &s.attributes),
             indices: graph.import_buffer("scene indices", &s.indices),
@@ -227,7 +231,9 @@ impl Renderer {
 
 fn check_size(device: &gpu::Device, settings: &Settings) -> Result<(), TechniqueError> {
     let limit = u64::from(device.features().max_image_dimension_2d);
-    for (what, found) in [("image width in pixels", settings.width_px), ("image height in pixels", settings.height_px)] {
+    for (what, found) in
+        [("image width in pixels", settings.width_px), ("image height in pixels", settings.height_px)]
+    {
         if u64::from(found) > limit || found == 0 {
             return Err(TechniqueError::TooLarge { what: what.to_owned(), found: found.into(), limit });
         }
@@ -308,7 +314,9 @@ impl View {
         let distance_from_world = -self.view_from_world.row(2);
         let to_eye = self.view_from_world.row(2).truncate();
         let (depth_to_distance, eye) = match settings.camera.projection {
-            Projection::Perspective { near_m, .. } => (Vec4::new(0.0, near_m, 1.0, 0.0), self.eye_ws.extend(1.0)),
+            Projection::Perspective { near_m, .. } => {
+                (Vec4::new(0.0, near_m, 1.0, 0.0), self.eye_ws.extend(1.0))
+            }
             Projection::Orthographic { near_m, far_m, .. } => {
                 (Vec4::new(near_m - far_m, far_m, 0.0, 1.0), to_eye.extend(0.0))
             }

@@ -8,6 +8,9 @@ use afterlight_shader::structs::{
     DRAW_MIRRORED, DrawData, MATERIAL_DOUBLE_SIDED, MATERIAL_UNLIT, MaterialData, NO_TEXTURE, TRIANGLE_BITS,
 };
 
+use glam::Vec3;
+use rayon::prelude::*;
+
 use crate::{
     error::TechniqueError,
     textures::{Role, TextureTable},
@@ -51,8 +54,12 @@ pub struct SceneGpu {
     pub(crate) positions: gpu::Buffer,
     pub(crate) attributes: gpu::Buffer,
     pub(crate) indices: gpu::Buffer,
+    /// One `DrawData` a draw: the vertex stream of instances.
     pub(crate) draws: gpu::Buffer,
-    pub(crate) materials: gpu::Buffer,
+    /// The same, four texels a draw, for compute.
+    pub(crate) draw_data: gpu::Image,
+    /// Eight texels a material.
+    pub(crate) materials: gpu::Image,
     pub(crate) uv_transforms: gpu::Buffer,
     pub(crate) texture_set: gpu::DescriptorSet,
     /// Specialization constants that fit the scene, by name.
@@ -78,18 +85,25 @@ impl SceneGpu {
     ///
     /// # Errors
     /// An image that does not decode or is larger than the device takes; too many draws; the device.
-    pub fn upload(device: &gpu::Device, scene: &Scene, progress: Progress<'_>) -> Result<Arc<Self>, TechniqueError> {
+    pub fn upload(
+        device: &gpu::Device,
+        scene: &Scene,
+        progress: Progress<'_>,
+    ) -> Result<Arc<Self>, TechniqueError> {
         let mut uploader = device.uploader()?;
         let mut warnings = Vec::new();
-        let draws = DrawTable::new(scene, &mut warnings)?;
+        let (indices, pieces) = compact_pieces(scene);
+        let draws = DrawTable::new(scene, &pieces, &mut warnings)?;
         let table = TextureTable::plan(scene, device.features(), &mut warnings)?;
         let (materials, transforms) = material_records(&scene.materials, &table);
 
         let positions = upload_slice(device, &mut uploader, "scene positions", &scene.positions_os)?;
         let attributes = upload_slice(device, &mut uploader, "scene attributes", &scene.attributes)?;
-        let indices = upload_slice(device, &mut uploader, "scene indices", &scene.indices)?;
+        let indices = upload_slice(device, &mut uploader, "scene indices", &indices)?;
         let draw_buffer = upload_slice(device, &mut uploader, "scene draws", &draws.data)?;
-        let materials = upload_slice(device, &mut uploader, "scene materials", &materials)?;
+        let uint4 = vk::Format::R32G32B32A32_UINT;
+        let draw_data = record_image(device, &mut uploader, "scene draw records", &draws.data, 4, uint4)?;
+        let materials = record_image(device, &mut uploader, "scene materials", &materials, 8, uint4)?;
         let uv_transforms = upload_slice(device, &mut uploader, "scene texture transforms", &transforms)?;
         let textures = table.upload(device, &mut uploader, &scene.images, progress)?;
         uploader.finish()?;
@@ -103,9 +117,10 @@ impl SceneGpu {
             ("HAS_VERTEX_COLOR", u32::from(scene.attributes.iter().any(|a| a.color_rgba8 != u32::MAX))),
             ("HAS_UV_TRANSFORM", u32::from(!transforms.is_empty())),
         ];
-        let buffers = [&positions, &attributes, &indices, &draw_buffer, &materials, &uv_transforms];
+        let buffers = [&positions, &attributes, &indices, &draw_buffer, &uv_transforms];
+        let images = draw_data.allocated_bytes() + materials.allocated_bytes() + textures.bytes;
         Ok(Arc::new(Self {
-            bytes: buffers.iter().map(|b| b.allocated_bytes()).sum::<u64>() + textures.bytes,
+            bytes: buffers.iter().map(|b| b.allocated_bytes()).sum::<u64>() + images,
             texture_set: textures.set,
             constants,
             triangle_count: draws.infos.iter().map(|d| u64::from(d.index_count / 3)).sum(),
@@ -113,6 +128,7 @@ impl SceneGpu {
             draw_infos: draws.infos,
             bucket_first: draws.bucket_first,
             draws: draw_buffer,
+            draw_data,
             positions,
             attributes,
             indices,
@@ -151,6 +167,40 @@ pub(crate) fn upload_slice<T: bytemuck::NoUninit>(
     Ok(buffer)
 }
 
+/// Texels of a row of a record image: shaders address rows of this length.
+const ROW_TEXELS: usize = 1024;
+
+/// Uploads records into an image of four 32-bit words a texel, `stride_texels` (a power of two) a record, rows of 1,024
+/// texels, gaps filled with zeros.
+pub(crate) fn record_image<T: bytemuck::NoUninit>(
+    device: &gpu::Device,
+    uploader: &mut gpu::Uploader,
+    name: &str,
+    records: &[T],
+    stride_texels: usize,
+    format: vk::Format,
+) -> Result<gpu::Image, gpu::GpuError> {
+    let stride_bytes = 16 * stride_texels;
+    assert!(size_of::<T>() <= stride_bytes, "{name}: {} bytes in {stride_bytes}", size_of::<T>());
+    let rows = (records.len() * stride_texels).div_ceil(ROW_TEXELS).max(1);
+    let mut bytes = vec![0u8; rows * ROW_TEXELS * 16];
+    for (place, record) in bytes.chunks_exact_mut(stride_bytes).zip(records) {
+        place[..size_of::<T>()].copy_from_slice(bytemuck::bytes_of(record));
+    }
+    let image = device.create_image(&gpu::ImageDesc {
+        name,
+        format,
+        width: ROW_TEXELS as u32,
+        height: rows as u32,
+        layers: 1,
+        mips: 1,
+        samples: 1,
+        usage: vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST,
+    })?;
+    uploader.image(&image, 0, 0, &bytes)?;
+    Ok(image)
+}
+
 /// All draws of a scene by bucket.
 struct DrawTable {
     data: Vec<DrawData>,
@@ -159,8 +209,7 @@ struct DrawTable {
 }
 
 impl DrawTable {
-    fn new(scene: &Scene, warnings: &mut Vec<String>) -> Result<Self, TechniqueError> {
-        let pieces: Vec<Vec<Aabb>> = scene.meshes.iter().map(|mesh| piece_bounds(scene, mesh)).collect();
+    fn new(scene: &Scene, pieces: &[Vec<Aabb>], warnings: &mut Vec<String>) -> Result<Self, TechniqueError> {
         let mut by_bucket: [Vec<(DrawData, DrawInfo)>; BUCKETS] = Default::default();
         let mut blended = 0u64;
         for instance in &scene.instances {
@@ -173,7 +222,8 @@ impl DrawTable {
             let m = &instance.world_from_object;
             let mirrored = m.matrix3.determinant() < 0.0;
             let masked = matches!(material.alpha_mode, AlphaMode::Mask { .. });
-            let bucket = 4 * usize::from(masked) + 2 * usize::from(material.double_sided) + usize::from(mirrored);
+            let bucket =
+                4 * usize::from(masked) + 2 * usize::from(material.double_sided) + usize::from(mirrored);
             let rows = [0, 1, 2].map(|i| {
                 let row = m.matrix3.row(i);
                 [row.x, row.y, row.z, m.translation[i]]
@@ -201,7 +251,9 @@ impl DrawTable {
             }
         }
         if blended > 0 {
-            warnings.push(format!("{blended} draws with alpha blending are left out: no opaque technique shows them"));
+            warnings.push(format!(
+                "{blended} draws with alpha blending are left out: no opaque technique shows them"
+            ));
         }
         let mut table = Self { data: Vec::new(), infos: Vec::new(), bucket_first: [0; BUCKETS + 1] };
         for (bucket, draws) in by_bucket.into_iter().enumerate() {
@@ -223,21 +275,63 @@ impl DrawTable {
     }
 }
 
-/// Object-space bounds of each piece of a mesh.
-fn piece_bounds(scene: &Scene, mesh: &Mesh) -> Vec<Aabb> {
+/// All indices, the triangles of each mesh ordered so that its pieces of 1,024 are compact, and each piece's bounds in
+/// object space. Files order triangles by material or tool, and a piece that spans the scene is neither culled nor sorted.
+fn compact_pieces(scene: &Scene) -> (Vec<u32>, Vec<Vec<Aabb>>) {
+    let ordered: Vec<(Vec<u32>, Vec<Aabb>)> =
+        scene.meshes.par_iter().map(|mesh| compact_mesh(scene, mesh)).collect();
+    let mut indices = scene.indices.clone();
+    for (mesh, (order, _)) in scene.meshes.iter().zip(&ordered) {
+        let first = mesh.first_index as usize;
+        let old = &scene.indices[first..first + mesh.index_count as usize];
+        for (new, triangle) in indices[first..].chunks_exact_mut(3).zip(order) {
+            new.copy_from_slice(&old[*triangle as usize * 3..][..3]);
+        }
+    }
+    (indices, ordered.into_iter().map(|(_, bounds)| bounds).collect())
+}
+
+/// The new order of a mesh's triangles and the bounds of its pieces.
+fn compact_mesh(scene: &Scene, mesh: &Mesh) -> (Vec<u32>, Vec<Aabb>) {
     let first = mesh.first_index as usize;
     let indices = &scene.indices[first..first + mesh.index_count as usize];
     let positions = &scene.positions_os[mesh.first_vertex as usize..];
-    indices
-        .chunks(DRAW_TRIANGLES as usize * 3)
+    let corner = |triangle: u32, k: usize| Vec3::from(positions[indices[triangle as usize * 3 + k] as usize]);
+    let mut order: Vec<u32> = (0..mesh.index_count / 3).collect();
+    if order.len() > DRAW_TRIANGLES as usize {
+        let centroids: Vec<Vec3> =
+            order.iter().map(|&t| (corner(t, 0) + corner(t, 1) + corner(t, 2)) / 3.0).collect();
+        split_by_place(&mut order, &centroids);
+    }
+    let bounds = order
+        .chunks(DRAW_TRIANGLES as usize)
         .map(|piece| {
             let mut bounds = Aabb::EMPTY;
-            for &i in piece {
-                bounds.extend(positions[i as usize].into());
-            }
+            piece.iter().for_each(|&t| (0..3).for_each(|k| bounds.extend(corner(t, k))));
             bounds
         })
-        .collect()
+        .collect();
+    (order, bounds)
+}
+
+/// Splits triangles by the median of their centroids along the longest axis until pieces have at most 1,024; all pieces
+/// but the last are full. Within a piece the old order stays, for the vertex cache.
+fn split_by_place(order: &mut [u32], centroids: &[Vec3]) {
+    let pieces = order.len().div_ceil(DRAW_TRIANGLES as usize);
+    if pieces <= 1 {
+        order.sort_unstable();
+        return;
+    }
+    let mut bounds = Aabb::EMPTY;
+    order.iter().for_each(|&t| bounds.extend(centroids[t as usize]));
+    let axis = bounds.size().max_position();
+    let middle = pieces / 2 * DRAW_TRIANGLES as usize;
+    order.select_nth_unstable_by(middle, |&a, &b| {
+        centroids[a as usize][axis].total_cmp(&centroids[b as usize][axis]).then(a.cmp(&b))
+    });
+    let (low, high) = order.split_at_mut(middle);
+    split_by_place(low, centroids);
+    split_by_place(high, centroids);
 }
 
 fn uses_uv1(materials: &[Material]) -> bool {
@@ -285,7 +379,8 @@ fn material_records(materials: &[Material], table: &TextureTable) -> (Vec<Materi
                 roughness_factor: m.roughness_factor,
                 normal_scale: m.normal_scale,
                 occlusion_strength: m.occlusion_strength,
-                flags: u32::from(m.unlit) * MATERIAL_UNLIT | u32::from(m.double_sided) * MATERIAL_DOUBLE_SIDED,
+                flags: u32::from(m.unlit) * MATERIAL_UNLIT
+                    | u32::from(m.double_sided) * MATERIAL_DOUBLE_SIDED,
                 uv_transform: first,
                 base_color_slot: base_color,
                 metallic_roughness_slot: metallic_roughness,
@@ -302,4 +397,41 @@ fn material_records(materials: &[Material], table: &TextureTable) -> (Vec<Materi
 /// Names of images for messages.
 pub(crate) fn image_name(images: &[Image], index: u32) -> &str {
     images.get(index as usize).map_or("image", |i| i.name.as_str())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use afterlight_scene::load_source;
+
+    /// Each mesh keeps its triangles, and pieces hold theirs.
+    #[test]
+    fn compact_pieces_keep_every_triangle() {
+        let scene = load_source("builtin:colonnade?triangles=30000&texture=16", &Default::default()).unwrap();
+        let (indices, bounds) = compact_pieces(&scene);
+        let mut cut = 0;
+        for (mesh, pieces) in scene.meshes.iter().zip(&bounds) {
+            let range = mesh.first_index as usize..(mesh.first_index + mesh.index_count) as usize;
+            let sorted = |list: &[u32]| {
+                let mut triangles: Vec<[u32; 3]> = list.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
+                triangles.sort_unstable();
+                triangles
+            };
+            assert_eq!(
+                sorted(&scene.indices[range.clone()]),
+                sorted(&indices[range.clone()]),
+                "{}",
+                mesh.name
+            );
+            assert_eq!(pieces.len() as u32, (mesh.index_count / 3).div_ceil(DRAW_TRIANGLES));
+            for (piece, held) in indices[range].chunks(3 * DRAW_TRIANGLES as usize).zip(pieces) {
+                for &i in piece {
+                    let p = Vec3::from(scene.positions_os[(mesh.first_vertex + i) as usize]);
+                    assert!(p.cmpge(held.min).all() && p.cmple(held.max).all(), "{}", mesh.name);
+                }
+            }
+            cut += pieces.len() - 1;
+        }
+        assert!(cut > 0, "no mesh of the scene is cut");
+    }
 }

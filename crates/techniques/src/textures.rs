@@ -26,7 +26,8 @@ pub(crate) type Role = TextureRole;
 const BUCKET_LIMITS: [usize; 3] = [12, 8, 8];
 
 /// Formats of the classes.
-const FORMATS: [vk::Format; 3] = [vk::Format::R8G8B8A8_SRGB, vk::Format::R8G8_UNORM, vk::Format::R8G8B8A8_UNORM];
+const FORMATS: [vk::Format; 3] =
+    [vk::Format::R8G8B8A8_SRGB, vk::Format::R8G8_UNORM, vk::Format::R8G8B8A8_UNORM];
 
 /// Texels that decoded textures may hold in memory before they are uploaded, in textures.
 const DECODED_IN_FLIGHT: usize = 4;
@@ -85,7 +86,11 @@ impl TextureTable {
     ///
     /// # Errors
     /// A texture larger than the device takes; more layers of one size than it takes.
-    pub fn plan(scene: &Scene, features: &gpu::Features, warnings: &mut Vec<String>) -> Result<Self, TechniqueError> {
+    pub fn plan(
+        scene: &Scene,
+        features: &gpu::Features,
+        warnings: &mut Vec<String>,
+    ) -> Result<Self, TechniqueError> {
         let mut classes: [BTreeMap<Use, (u32, u32)>; 3] = Default::default();
         for material in &scene.materials {
             for (texture, role) in slots(material) {
@@ -94,7 +99,10 @@ impl TextureTable {
                 let largest = image.width.max(image.height);
                 if largest > features.max_image_dimension_2d {
                     return Err(TechniqueError::TooLarge {
-                        what: format!("{}: width or height in pixels", image_name(&scene.images, texture.image)),
+                        what: format!(
+                            "{}: width or height in pixels",
+                            image_name(&scene.images, texture.image)
+                        ),
                         found: largest.into(),
                         limit: features.max_image_dimension_2d.into(),
                     });
@@ -150,7 +158,12 @@ impl TextureTable {
             let mut class_arrays = Vec::new();
             for (bucket, (key, layers)) in buckets.iter().enumerate() {
                 class_arrays.push(create_array(device, class, key, layers.len() as u32)?);
-                jobs.extend(layers.iter().enumerate().map(|(layer, place)| (class, bucket, layer as u32, *place, *key)));
+                jobs.extend(
+                    layers
+                        .iter()
+                        .enumerate()
+                        .map(|(layer, place)| (class, bucket, layer as u32, *place, *key)),
+                );
             }
             arrays.push(class_arrays);
         }
@@ -163,20 +176,25 @@ impl TextureTable {
             scope.spawn(move || {
                 // A receiver that is gone has met an error already.
                 jobs.into_par_iter().for_each_with(send, |send, (class, bucket, layer, place, key)| {
-                    let decoded =
-                        decode(&images[place.image as usize], role_of(place.role), Some((key.width, key.height)));
+                    let decoded = decode(
+                        &images[place.image as usize],
+                        role_of(place.role),
+                        Some((key.width, key.height)),
+                    );
                     let _ = send.send((class, bucket, layer, decoded));
                 });
             });
-            receive.iter().try_for_each(|(class, bucket, layer, decoded): (usize, usize, u32, Result<MipChain, SceneError>)| {
-                let chain = decoded?;
-                check_format(class, &chain);
-                for (mip, level) in chain.levels.iter().enumerate() {
-                    uploader.image(&arrays[class][bucket], mip as u32, layer, level)?;
-                }
-                progress(done.fetch_add(1, Ordering::Relaxed) + 1, total);
-                Ok::<(), TechniqueError>(())
-            })
+            receive.iter().try_for_each(
+                |(class, bucket, layer, decoded): (usize, usize, u32, Result<MipChain, SceneError>)| {
+                    let chain = decoded?;
+                    check_format(class, &chain);
+                    for (mip, level) in chain.levels.iter().enumerate() {
+                        uploader.image(&arrays[class][bucket], mip as u32, layer, level)?;
+                    }
+                    progress(done.fetch_add(1, Ordering::Relaxed) + 1, total);
+                    Ok::<(), TechniqueError>(())
+                },
+            )
         })?;
         self.describe(device, uploader, &arrays)
     }
@@ -187,12 +205,8 @@ impl TextureTable {
         uploader: &mut gpu::Uploader,
         arrays: &[Vec<gpu::Image>],
     ) -> Result<UploadedTextures, TechniqueError> {
-        let filler = create_array(
-            device,
-            2,
-            &BucketKey { width: 1, height: 1, sampler: Sampler::default() },
-            1,
-        )?;
+        let filler =
+            create_array(device, 2, &BucketKey { width: 1, height: 1, sampler: Sampler::default() }, 1)?;
         uploader.image(&filler, 0, 0, &[255; 4])?;
         let mut writes = Vec::new();
         for class in 0..3 {
@@ -201,7 +215,8 @@ impl TextureTable {
                     (Some(image), Some((key, _))) => (image, key.sampler),
                     _ => (&filler, Sampler::default()),
                 };
-                let view = image.view(&gpu::ViewDesc { kind: gpu::ViewKind::D2Array, ..gpu::ViewDesc::default() })?;
+                let view = image
+                    .view(&gpu::ViewDesc { kind: gpu::ViewKind::D2Array, ..gpu::ViewDesc::default() })?;
                 writes.push(gpu::SlotWrite {
                     binding: class as u32,
                     element: index as u32,
@@ -229,7 +244,12 @@ fn check_format(class: usize, chain: &MipChain) {
     assert_eq!(chain.format, expected, "decoded format of class {class}");
 }
 
-fn create_array(device: &gpu::Device, class: usize, key: &BucketKey, layers: u32) -> Result<gpu::Image, gpu::GpuError> {
+fn create_array(
+    device: &gpu::Device,
+    class: usize,
+    key: &BucketKey,
+    layers: u32,
+) -> Result<gpu::Image, gpu::GpuError> {
     device.create_image(&gpu::ImageDesc {
         name: &format!("textures {}×{}", key.width, key.height),
         format: FORMATS[class],
@@ -252,7 +272,11 @@ fn sampler_desc(s: &Sampler) -> gpu::SamplerDesc {
     gpu::SamplerDesc {
         mag_filter: filter(s.mag_nearest),
         min_filter: filter(s.min_nearest),
-        mipmap_mode: if s.mip == MipMode::Linear { vk::SamplerMipmapMode::LINEAR } else { vk::SamplerMipmapMode::NEAREST },
+        mipmap_mode: if s.mip == MipMode::Linear {
+            vk::SamplerMipmapMode::LINEAR
+        } else {
+            vk::SamplerMipmapMode::NEAREST
+        },
         max_lod: if s.mip == MipMode::None { 0.25 } else { vk::LOD_CLAMP_NONE },
         address_u: wrap(s.wrap_u),
         address_v: wrap(s.wrap_v),
@@ -304,7 +328,8 @@ fn merge_cheapest(buckets: &mut BTreeMap<BucketKey, Vec<Use>>) -> bool {
         .enumerate()
         .flat_map(|(i, a)| keys[..i].iter().map(move |b| (a, b)))
         .map(|(a, b)| {
-            let union = BucketKey { width: a.width.max(b.width), height: a.height.max(b.height), sampler: a.sampler };
+            let union =
+                BucketKey { width: a.width.max(b.width), height: a.height.max(b.height), sampler: a.sampler };
             let (na, nb) = (buckets[a].len(), buckets[b].len());
             let added = texels(&union, na + nb) - texels(a, na) - texels(b, nb);
             ((a.sampler != b.sampler, added), *a, *b)

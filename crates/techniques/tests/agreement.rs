@@ -46,7 +46,8 @@ fn a_range_larger_by_two_percent_is_caught() {
     let gpu = afterlight_testkit::gpu();
     let stage = Stage::new(&gpu, "builtin:colonnade?triangles=30000");
     let settings = stage.settings((160, 90), 100);
-    let mutant = afterlight_techniques::Settings { lights: wider(&settings.lights, 1.02), ..settings.clone() };
+    let mutant =
+        afterlight_techniques::Settings { lights: wider(&settings.lights, 1.02), ..settings.clone() };
     let forward = find("forward").unwrap();
     let db = psnr(&stage.image(forward, &settings), &stage.image(forward, &mutant));
     assert!(db < 45.0, "a mutant within the bound: {db:.2} dB");
@@ -76,7 +77,8 @@ fn on_sponza_with_100_lights() {
     let gpu = afterlight_testkit::gpu();
     let Some(scenes) = afterlight_testkit::shared_scenes() else { return };
     let stage = Stage::new(&gpu, &scenes.join("sponza/sponza.gltf").to_string_lossy());
-    let camera = Camera::look_at("view", Vec3::new(-9.0, 2.5, 0.0), Vec3::new(5.0, 3.0, 0.0), 60f32.to_radians(), 0.1);
+    let camera =
+        Camera::look_at("view", Vec3::new(-9.0, 2.5, 0.0), Vec3::new(5.0, 3.0, 0.0), 60f32.to_radians(), 0.1);
     let settings = stage.from(camera, (320, 180), 100);
     all_agree(&stage, &settings, "sponza", 2);
 }

@@ -29,7 +29,8 @@ pub fn gpu() -> GpuTest {
             validate: true,
             ..DeviceOptions::default()
         };
-        Device::open(&options).unwrap_or_else(|e| panic!("tests need a Vulkan device and the validation layer: {e}"))
+        Device::open(&options)
+            .unwrap_or_else(|e| panic!("tests need a Vulkan device and the validation layer: {e}"))
     });
     device.validation_messages();
     GpuTest { device: device.clone(), _turn: turn }

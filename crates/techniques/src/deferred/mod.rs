@@ -53,8 +53,9 @@ impl Technique for Deferred {
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let mut filled = gbuffer::fill(graph, frame, "deferred", vk::Format::D32_SFLOAT)?;
-        let volume = volumes::volume_state(frame, Some("volumes/light.frag"), vk::CullModeFlags::FRONT, Blend::ADD)?
-            .depth(volumes::BEHIND_SURFACE);
+        let volume =
+            volumes::volume_state(frame, Some("volumes/light.frag"), vk::CullModeFlags::FRONT, Blend::ADD)?
+                .depth(volumes::BEHIND_SURFACE);
         let bounded = frame.lights.count - frame.lights.unbounded_count;
 
         let mut pass = graph.raster("deferred/lights");

@@ -20,7 +20,10 @@ static INFO: Info = Info {
     id: "deferred-stencil",
     title: "Deferred shading, stencil-bounded volumes",
     summary: "Each light's volume first marks in stencil the pixels whose surface lies inside, then only those are lit.",
-    sources: &[Source { key: "petrescu-2016", section: "2.1" }, Source { key: "petrescu-2016", section: "4.3" }],
+    sources: &[
+        Source { key: "petrescu-2016", section: "2.1" },
+        Source { key: "petrescu-2016", section: "4.3" },
+    ],
     answers: Answers {
         surface: "G-buffer, 1 sample",
         lights: "light volumes, with stencil",
@@ -88,8 +91,9 @@ impl Technique for DeferredStencil {
         let mark = volumes::volume_state(frame, None, vk::CullModeFlags::NONE, Blend::NONE)?
             .depth(IN_FRONT)
             .stencil(MARK);
-        let light = volumes::volume_state(frame, Some("volumes/light.frag"), vk::CullModeFlags::FRONT, Blend::ADD)?
-            .stencil(MARKED);
+        let light =
+            volumes::volume_state(frame, Some("volumes/light.frag"), vk::CullModeFlags::FRONT, Blend::ADD)?
+                .stencil(MARKED);
 
         let mut pass = graph.raster("deferred-stencil/lights");
         frame.bind_scene(&mut pass);

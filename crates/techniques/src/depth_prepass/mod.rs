@@ -64,7 +64,8 @@ impl Technique for DepthPrepass {
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
-        let radiance = graph.image("depth-prepass/radiance", frame.image_info(vk::Format::R16G16B16A16_SFLOAT));
+        let radiance =
+            graph.image("depth-prepass/radiance", frame.image_info(vk::Format::R16G16B16A16_SFLOAT));
         let depth = graph.image("depth-prepass/depth", frame.image_info(vk::Format::D32_SFLOAT_S8_UINT));
         let depth_only = Surfaces::depth_only(frame)?;
         let shaded = Surfaces::shaded(frame, "forward/forward.frag", "forward/forward.frag#mask")?

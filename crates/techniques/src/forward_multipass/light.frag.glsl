@@ -12,7 +12,7 @@ layout(push_constant, scalar) uniform Push {
 layout(location = 0) out vec4 radiance_out;
 
 void main() {
-    MaterialData m = materials[draw_material.y];
+    MaterialData m = load_material(draw_material.y);
     SurfacePoint p = surface_point();
     vec4 base = visible_base_color(m, p);
     Surface s = surface_at(m, p, base.rgb);

@@ -7,7 +7,8 @@ use afterlight_scene::Aabb;
 use glam::{Mat4, Vec3};
 
 use crate::{
-    Answers, AppendixA, Exactness, Frame, Info, ParamInfo, ParamKind, Params, Source, Technique, TechniqueError,
+    Answers, AppendixA, Exactness, Frame, Info, ParamInfo, ParamKind, Params, Source, Technique,
+    TechniqueError,
     cost::{Cost, Workload, forward},
     depth_prepass::FIRST_FRAGMENT,
     geometry::Surfaces,
@@ -65,7 +66,8 @@ impl Technique for ForwardMultipass {
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
-        let radiance = graph.image("forward-multipass/radiance", frame.image_info(vk::Format::R16G16B16A16_SFLOAT));
+        let radiance =
+            graph.image("forward-multipass/radiance", frame.image_info(vk::Format::R16G16B16A16_SFLOAT));
         let depth = graph.image("forward-multipass/depth", frame.image_info(vk::Format::D32_SFLOAT_S8_UINT));
         let ambient = Surfaces::shaded(
             frame,
@@ -93,10 +95,11 @@ impl Technique for ForwardMultipass {
 
 /// Draws all surfaces once a light. Surfaces of one depth must not both add: the stencil lets the first of a pixel pass.
 fn draw_lights(frame: &Frame<'_>, pass: &mut RasterPass<'_>) -> Result<(), TechniqueError> {
-    let mut surfaces = Surfaces::shaded(frame, "forward_multipass/light.frag", "forward_multipass/light.frag#mask")?
-        .depth(DepthTest::EQUAL)
-        .stencil(FIRST_FRAGMENT, 1)
-        .blend(vec![Blend::ADD]);
+    let mut surfaces =
+        Surfaces::shaded(frame, "forward_multipass/light.frag", "forward_multipass/light.frag#mask")?
+            .depth(DepthTest::EQUAL)
+            .stencil(FIRST_FRAGMENT, 1)
+            .blend(vec![Blend::ADD]);
     let whole = Rect { x_px: 0, y_px: 0, width_px: frame.width_px, height_px: frame.height_px };
     let by_light = frame.params.get(&SCISSOR) == "light";
     for index in 0..frame.lights.count {

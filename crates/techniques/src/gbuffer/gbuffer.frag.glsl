@@ -13,7 +13,7 @@ layout(location = 2) out vec2 normal_oct;
 layout(location = 3) out float roughness;
 
 void main() {
-    MaterialData m = materials[draw_material.y];
+    MaterialData m = load_material(draw_material.y);
     SurfacePoint p = surface_point();
     vec4 base = visible_base_color(m, p);
     Surface s = surface_at(m, p, base.rgb);

@@ -42,7 +42,9 @@ pub fn fill(
     technique: &str,
     depth_format: vk::Format,
 ) -> Result<GBuffer, TechniqueError> {
-    let image = |graph: &mut Graph, name: &str, format| graph.image(&format!("{technique}/{name}"), frame.image_info(format));
+    let image = |graph: &mut Graph, name: &str, format| {
+        graph.image(&format!("{technique}/{name}"), frame.image_info(format))
+    };
     let accumulation = image(graph, "accumulation", vk::Format::R16G16B16A16_SFLOAT);
     let base_color = image(graph, "base color", vk::Format::R8G8B8A8_SRGB);
     let normal = image(graph, "normal", vk::Format::R16G16_UNORM);

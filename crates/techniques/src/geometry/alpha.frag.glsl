@@ -6,5 +6,5 @@
 #include "surface_in.glsl"
 
 void main() {
-    visible_base_color(materials[draw_material.y], surface_point());
+    visible_base_color(load_material(draw_material.y), surface_point());
 }

@@ -4,7 +4,9 @@
 //! call over the draws in view. Masked surfaces have pipelines of their own, since `discard` keeps early depth tests from
 //! opaque ones.
 
-use afterlight_graph::{Blend, DepthTest, Draw, DrawCall, RasterPass, RasterState, Rect, StencilTest, gpu::vk};
+use afterlight_graph::{
+    Blend, DepthTest, Draw, DrawCall, RasterPass, RasterState, Rect, StencilTest, gpu::vk,
+};
 use afterlight_graph::{VertexAttribute, VertexLayout, VertexStream};
 use afterlight_shader::Shader;
 
@@ -57,7 +59,11 @@ impl Surfaces {
     /// # Errors
     /// A name that is not compiled in.
     pub fn depth_only(frame: &Frame<'_>) -> Result<Self, TechniqueError> {
-        Self::new(frame, ("geometry/surface.vert#position", None), ("geometry/surface.vert#uv", "geometry/alpha.frag"))
+        Self::new(
+            frame,
+            ("geometry/surface.vert#position", None),
+            ("geometry/surface.vert#uv", "geometry/alpha.frag"),
+        )
     }
 
     /// Vertex and fragment shaders by name, for opaque and for masked surfaces.
@@ -74,7 +80,10 @@ impl Surfaces {
                 vertex: frame.shader(opaque.0)?,
                 fragment: opaque.1.map(|name| frame.shader(name)).transpose()?,
             },
-            masked: SurfaceShaders { vertex: frame.shader(masked.0)?, fragment: Some(frame.shader(masked.1)?) },
+            masked: SurfaceShaders {
+                vertex: frame.shader(masked.0)?,
+                fragment: Some(frame.shader(masked.1)?),
+            },
             depth: DepthTest::NEAREST,
             stencil: None,
             stencil_reference: 0,
@@ -123,7 +132,12 @@ impl Surfaces {
     }
 
     /// A draw of surfaces of one bucket by any call whose first instances are draw numbers.
-    pub(crate) fn bucket_draw<'a>(&self, frame: &'a Frame<'_>, bucket: Bucket, call: DrawCall<'a>) -> Draw<'a> {
+    pub(crate) fn bucket_draw<'a>(
+        &self,
+        frame: &'a Frame<'_>,
+        bucket: Bucket,
+        call: DrawCall<'a>,
+    ) -> Draw<'a> {
         let shaders = if bucket.masked() { &self.masked } else { &self.opaque };
         let mut state = RasterState::new(&shaders.vertex, shaders.fragment.as_ref());
         let all: Vec<&Shader> = std::iter::once(&shaders.vertex).chain(&shaders.fragment).collect();
@@ -144,7 +158,6 @@ impl Surfaces {
         draw.push = self.push.clone();
         draw.scissor = self.scissor;
         draw
-
     }
 }
 

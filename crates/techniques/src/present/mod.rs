@@ -9,7 +9,11 @@ use crate::{error::TechniqueError, frame::Frame};
 ///
 /// # Errors
 /// A shader that is not compiled in.
-pub fn tonemap(graph: &mut Graph, frame: &Frame<'_>, hdr: &ImageHandle) -> Result<ImageHandle, TechniqueError> {
+pub fn tonemap(
+    graph: &mut Graph,
+    frame: &Frame<'_>,
+    hdr: &ImageHandle,
+) -> Result<ImageHandle, TechniqueError> {
     let target = graph.image("final color", frame.image_info(vk::Format::R8G8B8A8_UNORM));
     graph.mark_output(&target);
     let shader = frame.shader("present/tonemap.comp")?;

@@ -14,7 +14,7 @@ layout(location = 0) out uint triangle_id;
 
 void main() {
 #ifdef ALPHA_MASK
-    visible_base_color(materials[draw_material.y], surface_point());
+    visible_base_color(load_material(draw_material.y), surface_point());
 #endif
     triangle_id = draw_material.x << TRIANGLE_BITS | uint(gl_PrimitiveID);
 }

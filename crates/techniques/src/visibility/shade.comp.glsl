@@ -27,7 +27,7 @@ void main() {
     if (covered) {
         uint material;
         SurfacePoint point = triangle_point(id, ndc_from_pixel(uvec2(pixel)), material);
-        MaterialData m = materials[material];
+        MaterialData m = load_material(material);
         s = surface_at(m, point, base_color_at(m, point).rgb);
         p = shading_point(s);
         distance_m = max(dot(frame.distance_from_world, vec4(s.position_ws, 1.0)), 0.0);

@@ -4,7 +4,8 @@
 //! them, so that the eye may be inside.
 
 use afterlight_graph::{
-    Blend, DepthTest, Draw, DrawCall, RasterPass, RasterState, VertexAttribute, VertexLayout, VertexStream, gpu::vk,
+    Blend, DepthTest, Draw, DrawCall, RasterPass, RasterState, VertexAttribute, VertexLayout, VertexStream,
+    gpu::vk,
 };
 use glam::Vec3;
 
@@ -26,9 +27,12 @@ pub fn icosphere() -> (Vec<[f32; 3]>, Vec<u16>) {
     for c in &mut corners {
         *c = c.normalize();
     }
-    let edge = corners[0].distance(*corners[1..].iter().min_by(|a, b| {
-        corners[0].distance(**a).total_cmp(&corners[0].distance(**b))
-    }).unwrap_or(&corners[0]));
+    let edge = corners[0].distance(
+        *corners[1..]
+            .iter()
+            .min_by(|a, b| corners[0].distance(**a).total_cmp(&corners[0].distance(**b)))
+            .unwrap_or(&corners[0]),
+    );
     let near = |a: Vec3, b: Vec3| a.distance(b) < edge * 1.1;
     let mut faces = Vec::new();
     for i in 0..12 {
@@ -130,12 +134,25 @@ pub fn volume_draw<'a>(frame: &'a Frame<'_>, state: RasterState, first: u32, cou
 ///
 /// # Errors
 /// A shader that is not compiled in.
-pub fn draw_unbounded(frame: &Frame<'_>, pass: &mut RasterPass<'_>, fragment: &str) -> Result<(), TechniqueError> {
+pub fn draw_unbounded(
+    frame: &Frame<'_>,
+    pass: &mut RasterPass<'_>,
+    fragment: &str,
+) -> Result<(), TechniqueError> {
     if frame.lights.unbounded_count > 0 {
-        let state =
-            state(frame, "volumes/volume.vert#full-screen", Some(fragment), vk::CullModeFlags::NONE, Blend::ADD)?;
-        let call =
-            DrawCall::Direct { vertices: 3, instances: frame.lights.unbounded_count, first_vertex: 0, first_instance: 0 };
+        let state = state(
+            frame,
+            "volumes/volume.vert#full-screen",
+            Some(fragment),
+            vk::CullModeFlags::NONE,
+            Blend::ADD,
+        )?;
+        let call = DrawCall::Direct {
+            vertices: 3,
+            instances: frame.lights.unbounded_count,
+            first_vertex: 0,
+            first_instance: 0,
+        };
         pass.draw(Draw::new(state, call));
     }
     Ok(())
@@ -155,6 +172,9 @@ mod tests {
             assert!(distance >= 1.0, "a face at {distance} of the centre");
         }
         let farthest = vertices.iter().map(|v| Vec3::from(*v).length()).fold(0.0, f32::max);
-        assert!(farthest < 1.1, "corners at {farthest}: light volumes would cover much that they do not light");
+        assert!(
+            farthest < 1.1,
+            "corners at {farthest}: light volumes would cover much that they do not light"
+        );
     }
 }

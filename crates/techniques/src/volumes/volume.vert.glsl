@@ -4,9 +4,8 @@
 #extension GL_GOOGLE_include_directive : require
 #include "frame.glsl"
 
-layout(set = 0, binding = 5, scalar) readonly buffer LightSpheres {
-    vec4 light_spheres[];
-};
+// Centre and range of every light, 1,024 a row.
+layout(set = 0, binding = 5) uniform texture2D light_spheres;
 
 layout(location = 0) flat out uint light_index;
 #ifndef FULL_SCREEN
@@ -19,7 +18,7 @@ void main() {
     vec2 corner = vec2(gl_VertexIndex == 1 ? 3.0 : -1.0, gl_VertexIndex == 2 ? 3.0 : -1.0);
     gl_Position = vec4(corner, 0.0, 1.0);
 #else
-    vec4 sphere = light_spheres[gl_InstanceIndex];
+    vec4 sphere = texelFetch(light_spheres, ivec2(gl_InstanceIndex & 1023, gl_InstanceIndex >> 10), 0);
     gl_Position = frame.clip_from_world * vec4(sphere.xyz + corner * sphere.w, 1.0);
 #endif
 }

@@ -20,7 +20,8 @@ pub struct Stage {
 impl Stage {
     /// Loads and uploads a scene.
     pub fn new(device: &gpu::Device, source: &str) -> Self {
-        let scene = scene::load_source(source, &scene::LoadOptions::default()).unwrap_or_else(|e| panic!("{e}"));
+        let scene =
+            scene::load_source(source, &scene::LoadOptions::default()).unwrap_or_else(|e| panic!("{e}"));
         Self::of(device, scene)
     }
 
@@ -46,7 +47,8 @@ impl Stage {
 
     /// A technique made ready.
     pub fn prepare(&self, technique: &dyn Technique, settings: &Settings) -> Prepared {
-        let renderer = Renderer::with_scene(&self.device, self.uploaded.clone(), settings).unwrap_or_else(|e| panic!("{e}"));
+        let renderer = Renderer::with_scene(&self.device, self.uploaded.clone(), settings)
+            .unwrap_or_else(|e| panic!("{e}"));
         let prepared = renderer.prepare(technique, &Params::default());
         prepared.unwrap_or_else(|e| panic!("{}: {e}", technique.info().id))
     }
