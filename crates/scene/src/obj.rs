@@ -102,11 +102,11 @@ fn texture_name(text: &str) -> Option<&str> {
             _ => 1,
         };
         for k in 0..most {
-            let (word, next) = tail.trim_start().split_once(char::is_whitespace)?;
-            if k > 0 && !numeric(word) {
-                break;
+            match tail.trim_start().split_once(char::is_whitespace) {
+                Some((word, next)) if k == 0 || numeric(word) => tail = next,
+                None if k == 0 => return None,
+                _ => break,
             }
-            tail = next;
         }
         rest = tail.trim_start();
     }

@@ -256,8 +256,12 @@ static LINEAR_FROM_SRGB: LazyLock<[u16; 256]> =
     LazyLock::new(|| std::array::from_fn(|i| (linear_from_srgb(i as f64 / 255.0) * 65535.0).round() as u16));
 
 /// Linear light, 65535 for 1, to the nearest sRGB byte.
-static SRGB_FROM_LINEAR: LazyLock<Vec<u8>> = LazyLock::new(|| {
-    (0..=65535u32).map(|v| (srgb_from_linear(f64::from(v) / 65535.0) * 255.0).round() as u8).collect()
+static SRGB_FROM_LINEAR: LazyLock<Box<[u8; 65536]>> = LazyLock::new(|| {
+    let mut table = Box::new([0; 65536]);
+    for (v, byte) in (0u32..).zip(table.iter_mut()) {
+        *byte = (srgb_from_linear(f64::from(v) / 65535.0) * 255.0).round() as u8;
+    }
+    table
 });
 
 fn linear_from_srgb(v: f64) -> f64 {
@@ -303,23 +307,40 @@ impl Wide {
 
     /// Bytes as the source image had them: sRGB colours, all three components of normals.
     fn to_rgba8(&self, role: TextureRole) -> Vec<u8> {
-        let srgb = role.format() == TexelFormat::Rgba8Srgb;
-        let encode = |v: u16| if srgb { SRGB_FROM_LINEAR[usize::from(v)] } else { byte_from_wide(v) };
-        self.texels
-            .iter()
-            .flat_map(|t| [encode(t[0]), encode(t[1]), encode(t[2]), byte_from_wide(t[3])])
-            .collect()
+        let mut out = vec![0; 4 * self.texels.len()];
+        let (texels, _) = out.as_chunks_mut::<4>();
+        if role.format() == TexelFormat::Rgba8Srgb {
+            // as an array, so that no 16-bit index needs a check
+            let table: &[u8; 65536] = &SRGB_FROM_LINEAR;
+            for (o, t) in texels.iter_mut().zip(&self.texels) {
+                let color = |c: usize| table[usize::from(t[c])];
+                *o = [color(0), color(1), color(2), byte_from_wide(t[3])];
+            }
+        } else {
+            for (o, t) in texels.iter_mut().zip(&self.texels) {
+                *o = t.map(byte_from_wide);
+            }
+        }
+        out
     }
 
     /// Bytes of a level as it is uploaded.
     fn encode(&self, role: TextureRole) -> Vec<u8> {
-        match role.format() {
-            TexelFormat::Rg8Unorm => {
-                self.texels.iter().flat_map(|t| [byte_from_wide(t[0]), byte_from_wide(t[1])]).collect()
-            }
-            _ => self.to_rgba8(role),
+        if role.format() != TexelFormat::Rg8Unorm {
+            return self.to_rgba8(role);
         }
+        let mut out = vec![0; 2 * self.texels.len()];
+        for (o, t) in out.as_chunks_mut::<2>().0.iter_mut().zip(&self.texels) {
+            *o = [byte_from_wide(t[0]), byte_from_wide(t[1])];
+        }
+        out
     }
+}
+
+/// Rounds a number within [0, 65535] to the nearest whole one. Above 2^23 a float has no fraction,
+/// and its low bits are the number; a plain cast checks its range, which the compiler does not vectorise.
+fn round_u16(v: f32) -> u16 {
+    (v + 8_388_608.0).to_bits() as u16
 }
 
 /// A biased normal made unit, z at least 0 (it is not stored, so its sign cannot be).
@@ -327,16 +348,10 @@ fn renormalize(texel: &mut [u16; 4]) {
     const HALF: f32 = 32767.5;
     let [x, y, z] = [texel[0], texel[1], texel[2]].map(|v| f32::from(v) - HALF);
     let z = z.max(0.0);
-    let length = (x * x + y * y + z * z).sqrt();
-    if length > 0.0 {
-        let scale = HALF / length;
-        *texel = [
-            (x * scale + HALF + 0.5) as u16,
-            (y * scale + HALF + 0.5) as u16,
-            (z * scale + HALF + 0.5) as u16,
-            texel[3],
-        ];
-    }
+    // values are whole and the middle is not: x and y are never 0, nor is the length
+    let scale = HALF / (x * x + y * y + z * z).sqrt();
+    let unit = |v: f32| round_u16(v * scale + HALF);
+    *texel = [unit(x), unit(y), unit(z), texel[3]];
 }
 
 fn mip_chain(base: &Pixels, role: TextureRole) -> MipChain {
@@ -358,69 +373,83 @@ fn mip_chain(base: &Pixels, role: TextureRole) -> MipChain {
 
 fn base_level(base: &Pixels, role: TextureRole) -> Vec<u8> {
     match (role.format(), base.channels) {
-        (TexelFormat::Rg8Unorm, channels) => {
-            let mut out = Vec::with_capacity(2 * base.bytes.len() / channels);
-            for p in base.bytes.chunks_exact(channels) {
-                let mut texel = [u16::from(p[0]) * 257, u16::from(p[1]) * 257, u16::from(p[2]) * 257, 0];
-                renormalize(&mut texel);
-                out.extend_from_slice(&[byte_from_wide(texel[0]), byte_from_wide(texel[1])]);
-            }
-            out
-        }
+        (TexelFormat::Rg8Unorm, 4) => unit_xy(base.bytes.as_chunks::<4>().0),
+        (TexelFormat::Rg8Unorm, _) => unit_xy(base.bytes.as_chunks::<3>().0),
         (_, 4) => base.bytes.to_vec(),
-        (_, channels) => {
-            let mut out = vec![u8::MAX; 4 * base.bytes.len() / channels];
-            for (o, p) in out.chunks_exact_mut(4).zip(base.bytes.chunks_exact(channels)) {
-                o[..3].copy_from_slice(&p[..3]);
+        _ => {
+            let (from, _) = base.bytes.as_chunks::<3>();
+            let mut out = vec![u8::MAX; 4 * from.len()];
+            for (o, &[r, g, b]) in out.as_chunks_mut::<4>().0.iter_mut().zip(from) {
+                *o = [r, g, b, u8::MAX];
             }
             out
         }
     }
 }
 
+/// x and y of each texel's vector once it is unit, as bytes.
+fn unit_xy<const N: usize>(texels: &[[u8; N]]) -> Vec<u8> {
+    /// Texels a block: component by component the compiler works on several at once.
+    const BLOCK: usize = 64;
+    const HALF: f32 = 127.5;
+    let mut out = vec![0; 2 * texels.len()];
+    for (o, block) in out.chunks_mut(2 * BLOCK).zip(texels.chunks(BLOCK)) {
+        let (mut x, mut y, mut z) = ([0.0f32; BLOCK], [0.0f32; BLOCK], [HALF; BLOCK]);
+        for (i, t) in block.iter().enumerate() {
+            (x[i], y[i], z[i]) = (f32::from(t[0]) - HALF, f32::from(t[1]) - HALF, f32::from(t[2]) - HALF);
+        }
+        let (mut r, mut g) = ([0u16; BLOCK], [0u16; BLOCK]);
+        for i in 0..BLOCK {
+            let z = z[i].max(0.0);
+            // bytes are never at the middle: the length is at least 0.7
+            let scale = HALF / (x[i] * x[i] + y[i] * y[i] + z * z).sqrt();
+            (r[i], g[i]) = (round_u16(x[i] * scale + HALF), round_u16(y[i] * scale + HALF));
+        }
+        for (i, o) in o.as_chunks_mut::<2>().0.iter_mut().enumerate() {
+            *o = [r[i] as u8, g[i] as u8];
+        }
+    }
+    out
+}
+
 /// The level below an image of even size: averages of 2×2 bytes.
 fn halve_bytes(base: &Pixels, role: TextureRole) -> Wide {
-    let table = color_table(role);
     let (width, height) = (base.width / 2, base.height / 2);
-    let mut texels = Vec::with_capacity(width as usize * height as usize);
+    let mut texels = vec![[0; 4]; width as usize * height as usize];
     let row_bytes = base.width as usize * base.channels;
-    for rows in base.bytes.chunks_exact(2 * row_bytes) {
+    let srgb = role.format() == TexelFormat::Rgba8Srgb;
+    let table = &*LINEAR_FROM_SRGB;
+    let linear = |v: u8| u32::from(v) * 257;
+    for (out, rows) in texels.chunks_exact_mut(width as usize).zip(base.bytes.chunks_exact(2 * row_bytes)) {
         let (top, bottom) = rows.split_at(row_bytes);
-        if base.channels == 4 {
-            texels.extend(halve_row::<4>(&table, top, bottom));
-        } else {
-            texels.extend(halve_row::<3>(&table, top, bottom));
+        match (srgb, base.channels) {
+            (true, 4) => halve_row::<4>(|v| u32::from(table[usize::from(v)]), top, bottom, out),
+            (true, _) => halve_row::<3>(|v| u32::from(table[usize::from(v)]), top, bottom, out),
+            (false, 4) => halve_row::<4>(linear, top, bottom, out),
+            (false, _) => halve_row::<3>(linear, top, bottom, out),
         }
     }
     finish(Wide { width, height, texels }, role)
 }
 
-fn halve_row<'a, const N: usize>(
-    table: &'a [u16; 256],
-    top: &'a [u8],
-    bottom: &'a [u8],
-) -> impl Iterator<Item = [u16; 4]> + 'a {
+/// Averages two rows of `N` channels; `color` is the 16-bit value of a colour byte.
+#[inline(always)]
+fn halve_row<const N: usize>(color: impl Fn(u8) -> u32, top: &[u8], bottom: &[u8], out: &mut [[u16; 4]]) {
     let (top, _) = top.as_chunks::<N>();
     let (bottom, _) = bottom.as_chunks::<N>();
-    top.chunks_exact(2).zip(bottom.chunks_exact(2)).map(move |(t, b)| {
-        let color = |c: usize| {
-            let sum = [t[0][c], t[1][c], b[0][c], b[1][c]]
-                .iter()
-                .map(|&v| u32::from(table[usize::from(v)]))
-                .sum::<u32>();
-            ((sum + 2) / 4) as u16
-        };
-        let alpha = if N == 4 {
-            let sum = [t[0][N - 1], t[1][N - 1], b[0][N - 1], b[1][N - 1]]
-                .iter()
-                .map(|&v| u32::from(v))
-                .sum::<u32>();
-            ((sum * 257 + 2) / 4) as u16
-        } else {
-            u16::MAX
-        };
-        [color(0), color(1), color(2), alpha]
-    })
+    let (top, bottom) = (top.as_chunks::<2>().0, bottom.as_chunks::<2>().0);
+    for ((o, t), b) in out.iter_mut().zip(top).zip(bottom) {
+        for c in 0..3 {
+            let sum = color(t[0][c]) + color(t[1][c]) + color(b[0][c]) + color(b[1][c]);
+            o[c] = ((sum + 2) / 4) as u16;
+        }
+        o[3] = u16::MAX;
+        if N == 4 {
+            let sum: u32 =
+                [t[0][N - 1], t[1][N - 1], b[0][N - 1], b[1][N - 1]].iter().map(|&v| u32::from(v)).sum();
+            o[3] = ((sum * 257 + 2) / 4) as u16;
+        }
+    }
 }
 
 fn finish(mut level: Wide, role: TextureRole) -> Wide {

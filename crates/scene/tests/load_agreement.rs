@@ -18,7 +18,8 @@ fn sponza_is_whole() {
     let Some(scene) = load_scene("sponza/sponza.gltf") else { return };
     assert_eq!(scene.triangle_count(), 262_267);
     assert_eq!((scene.instances.len(), scene.materials.len(), scene.images.len()), (25, 25, 64));
-    let masked = |m: &&afterlight_scene::Material| matches!(m.alpha_mode, afterlight_scene::AlphaMode::Mask { .. });
+    let masked =
+        |m: &&afterlight_scene::Material| matches!(m.alpha_mode, afterlight_scene::AlphaMode::Mask { .. });
     assert_eq!(scene.materials.iter().filter(masked).count(), 3);
     // given tangents are kept: at right angles to the normals, with both handednesses
     let signs: Vec<f32> = scene.attributes.iter().map(|a| a.tangent_os().1).collect();
@@ -28,7 +29,8 @@ fn sponza_is_whole() {
 
 #[test]
 fn both_forms_of_san_miguel_agree() {
-    let (Some(plain), Some(packed)) = (load_scene("san_miguel/san_miguel.gltf"), load_scene("san_miguel/san_miguel_meshopt.gltf"))
+    let (Some(plain), Some(packed)) =
+        (load_scene("san_miguel/san_miguel.gltf"), load_scene("san_miguel/san_miguel_meshopt.gltf"))
     else {
         return;
     };
@@ -39,11 +41,15 @@ fn both_forms_of_san_miguel_agree() {
     assert_eq!((plain.instances.len(), packed.instances.len()), (8392, 8392));
     assert_eq!(plain.materials.len(), packed.materials.len());
     assert_eq!(plain.images.len(), packed.images.len());
-    let mirrored = |s: &Scene| s.instances.iter().filter(|i| i.world_from_object.matrix3.determinant() < 0.0).count();
+    let mirrored =
+        |s: &Scene| s.instances.iter().filter(|i| i.world_from_object.matrix3.determinant() < 0.0).count();
     assert_eq!((mirrored(&plain), mirrored(&packed)), (661, 661));
     // 12 bits of mantissa on coordinates of up to 33 m
     let (a, b) = (plain.bounds_ws(), packed.bounds_ws());
-    assert!((a.min - b.min).abs().max_element() < 0.02 && (a.max - b.max).abs().max_element() < 0.02, "{a:?} {b:?}");
+    assert!(
+        (a.min - b.min).abs().max_element() < 0.02 && (a.max - b.max).abs().max_element() < 0.02,
+        "{a:?} {b:?}"
+    );
     for (i, (p, q)) in plain.materials.iter().zip(&packed.materials).enumerate() {
         assert_eq!(p.name, q.name);
         assert_eq!((p.alpha_mode, p.double_sided), (q.alpha_mode, q.double_sided), "material {i}");

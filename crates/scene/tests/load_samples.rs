@@ -58,7 +58,10 @@ const TOLERATED: &[(&str, &str)] = &[
     ("BUFFER_VIEW_TARGET_OVERRIDE", "targets are hints for uploading, not used"),
     ("MESH_PRIMITIVE_INVALID_ATTRIBUTE", "attributes of unknown names are ignored"),
     ("MESH_PRIMITIVE_INDEXED_SEMANTIC_CONTINUITY", "sets are found by their numbers"),
-    ("MESH_PRIMITIVE_MORPH_TARGET_NO_BASE_ACCESSOR", "a target of an attribute that is not there changes nothing"),
+    (
+        "MESH_PRIMITIVE_MORPH_TARGET_NO_BASE_ACCESSOR",
+        "a target of an attribute that is not there changes nothing",
+    ),
     ("MESH_PRIMITIVE_TOO_FEW_TEXCOORDS", "texture coordinates are 0, with a warning"),
     ("MESH_PRIMITIVE_ATTRIBUTES_ACCESSOR_UNSIGNED_INT", "an application's own attribute, ignored"),
     ("DUPLICATE_ELEMENTS", "an extension named twice is the same extension"),
@@ -195,7 +198,8 @@ fn other_invalid_samples_end_in_a_line() {
             let result = load_file(&file);
             check_result(&file, &result);
             let name = file.file_name().unwrap().to_string_lossy().into_owned();
-            let expected = OTHERS.iter().find(|o| o.0 == name).unwrap_or_else(|| panic!("{name} is not listed")).1;
+            let expected =
+                OTHERS.iter().find(|o| o.0 == name).unwrap_or_else(|| panic!("{name} is not listed")).1;
             match (result.err().map(|e| e.to_string()), expected) {
                 (None, None) => {}
                 (Some(text), Some(part)) if text.contains(part) => {}

@@ -115,7 +115,8 @@ pub(super) fn decode_data_uri(
     if !media_types.contains(&media_type) {
         return Err(wrong(format!("the media type {media_type:?}"), media_types.join(" or ")));
     }
-    let data = load::percent_decode_bytes(data).ok_or_else(|| wrong("a broken % escape".into(), "%XX".into()))?;
+    let data =
+        load::percent_decode_bytes(data).ok_or_else(|| wrong("a broken % escape".into(), "%XX".into()))?;
     if !is_base64 {
         return Ok(data);
     }

@@ -56,7 +56,8 @@ fn check_scenes_and_nodes(file: &Path, root: &Root) -> Result<(), SceneError> {
         let at = |property: &str| format!("nodes[{i}].{property}");
         let has_trs = node.translation.is_some() || node.rotation.is_some() || node.scale.is_some();
         if node.matrix.is_some() && has_trs {
-            let (found, expected) = ("a matrix beside translation, rotation or scale", "one form of transform");
+            let (found, expected) =
+                ("a matrix beside translation, rotation or scale", "one form of transform");
             return Err(SceneError::invalid(file, at("matrix"), found, expected));
         }
         if let Some(mesh) = &node.mesh {
@@ -209,7 +210,12 @@ fn check_primitive(
         let name = partner.to_string();
         if !primitive.attributes.contains_key(&Checked::Valid(partner)) {
             let expected = "JOINTS_n and WEIGHTS_n together";
-            return Err(SceneError::invalid(file, format!("{at}.attributes"), format!("no {name}"), expected));
+            return Err(SceneError::invalid(
+                file,
+                format!("{at}.attributes"),
+                format!("no {name}"),
+                expected,
+            ));
         }
     }
     let mut vertices: Option<usize> = None;

@@ -162,7 +162,11 @@ fn append(scene: &mut Scene, vertices: Vertices) -> Placed {
 
 /// Checks indices and positions of meshes that nothing draws: a broken file is refused whether or
 /// not its broken part shows. Primitives without data are passed over.
-pub(super) fn check_unused(accessors: &Accessors, root: &Root, variants: &[Variant]) -> Result<(), SceneError> {
+pub(super) fn check_unused(
+    accessors: &Accessors,
+    root: &Root,
+    variants: &[Variant],
+) -> Result<(), SceneError> {
     let mut used = vec![false; root.meshes.len()];
     variants.iter().for_each(|v| used[v.mesh] = true);
     let unused = root.meshes.iter().zip(used).filter(|(_, used)| !used);
@@ -384,7 +388,11 @@ fn triangle_list(
 }
 
 /// The primitive's indices, each below the number of vertices; all vertices where it has none.
-fn corners(accessors: &Accessors, primitive: &Primitive, vertex_count: usize) -> Result<Vec<u32>, SceneError> {
+fn corners(
+    accessors: &Accessors,
+    primitive: &Primitive,
+    vertex_count: usize,
+) -> Result<Vec<u32>, SceneError> {
     match primitive.indices {
         None => Ok((0..vertex_count as u32).collect()),
         Some(accessor) => {

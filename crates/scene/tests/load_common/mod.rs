@@ -3,7 +3,8 @@
 
 use std::path::{Path, PathBuf};
 
-use afterlight_scene::Scene;
+use afterlight_scene::{LoadOptions, Scene, SceneError, load_bytes};
+use serde_json::{Value, json};
 
 /// The folder of reference scenes, or `None` with a line that says that a test is skipped.
 pub fn scenes_dir() -> Option<PathBuf> {
@@ -69,4 +70,109 @@ pub fn check_scene(scene: &Scene) -> Result<(), String> {
         }
     }
     Ok(())
+}
+
+/// A glTF made by a test: JSON beside one binary buffer.
+pub struct Document {
+    /// The JSON, without buffers, buffer views and accessors.
+    pub json: Value,
+    bytes: Vec<u8>,
+    views: Vec<Value>,
+    accessors: Vec<Value>,
+}
+
+impl Document {
+    /// A document with one node that shows mesh 0.
+    pub fn new() -> Self {
+        let json = json!({
+            "asset": {"version": "2.0"},
+            "scene": 0,
+            "scenes": [{"nodes": [0]}],
+            "nodes": [{"mesh": 0}],
+        });
+        Self { json, bytes: Vec::new(), views: Vec::new(), accessors: Vec::new() }
+    }
+
+    /// Adds bytes as a buffer view and returns its index.
+    pub fn view(&mut self, bytes: &[u8], stride_bytes: Option<usize>) -> usize {
+        self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
+        let mut view = json!({"buffer": 0, "byteOffset": self.bytes.len(), "byteLength": bytes.len()});
+        if let Some(stride) = stride_bytes {
+            view["byteStride"] = json!(stride);
+        }
+        self.bytes.extend_from_slice(bytes);
+        self.views.push(view);
+        self.views.len() - 1
+    }
+
+    /// The last buffer view, to be changed.
+    pub fn view_json(&mut self, index: usize) -> &mut Value {
+        &mut self.views[index]
+    }
+
+    /// Adds an accessor and returns its index.
+    pub fn accessor(&mut self, accessor: Value) -> usize {
+        self.accessors.push(accessor);
+        self.accessors.len() - 1
+    }
+
+    /// Adds an accessor of floats.
+    pub fn floats<const N: usize>(&mut self, values: &[[f32; N]]) -> usize {
+        let view = self.view(bytemuck::cast_slice(values.as_flattened()), None);
+        let shape = ["SCALAR", "VEC2", "VEC3", "VEC4"][N - 1];
+        self.accessor(
+            json!({"bufferView": view, "componentType": 5126, "count": values.len(), "type": shape}),
+        )
+    }
+
+    /// Adds an accessor of indices, 1, 2 or 4 bytes wide.
+    pub fn indices(&mut self, values: &[u32], width_bytes: usize) -> usize {
+        let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()[..width_bytes].to_vec()).collect();
+        let view = self.view(&bytes, None);
+        let component = [5121, 5123, 0, 5125][width_bytes - 1];
+        self.accessor(
+            json!({"bufferView": view, "componentType": component, "count": values.len(), "type": "SCALAR"}),
+        )
+    }
+
+    /// The document as a GLB.
+    pub fn glb(&self) -> Vec<u8> {
+        let mut json = self.json.clone();
+        let mut bin = self.bytes.clone();
+        bin.resize(bin.len().next_multiple_of(4), 0);
+        if !bin.is_empty() {
+            json["buffers"] = json!([{"byteLength": self.bytes.len()}]);
+        }
+        for (name, values) in [("bufferViews", &self.views), ("accessors", &self.accessors)] {
+            if !values.is_empty() {
+                json[name] = json!(values);
+            }
+        }
+        let mut text = serde_json::to_vec(&json).unwrap();
+        text.resize(text.len().next_multiple_of(4), b' ');
+        let mut out = b"glTF\x02\0\0\0".to_vec();
+        let length = 12 + 8 + text.len() + if bin.is_empty() { 0 } else { 8 + bin.len() };
+        out.extend((length as u32).to_le_bytes());
+        out.extend((text.len() as u32).to_le_bytes());
+        out.extend(b"JSON");
+        out.extend(&text);
+        if !bin.is_empty() {
+            out.extend((bin.len() as u32).to_le_bytes());
+            out.extend(b"BIN\0");
+            out.extend(&bin);
+        }
+        out
+    }
+
+    /// Loads the document.
+    pub fn load(&self) -> Result<Scene, SceneError> {
+        self.load_at(None)
+    }
+
+    /// Loads the document, posed at a time.
+    pub fn load_at(&self, time_s: Option<f64>) -> Result<Scene, SceneError> {
+        let scene = load_bytes(Path::new("test.glb"), &self.glb(), &LoadOptions { time_s })?;
+        check_scene(&scene).unwrap_or_else(|e| panic!("{e}"));
+        Ok(scene)
+    }
 }

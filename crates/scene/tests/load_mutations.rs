@@ -1,0 +1,155 @@
+//! Sample files with seeded damage: whatever comes in, the loader returns. The fuzz target in
+//! `fuzz/` does the same without an end; what it finds is kept in `fuzz/corpus`.
+
+mod load_common;
+
+use std::path::Path;
+
+use afterlight_scene::{
+    LoadOptions, load_bytes,
+    texture::{TextureRole, decode},
+};
+use load_common::{check_scene, files_under, scenes_dir};
+use rayon::prelude::*;
+
+/// SplitMix64 (Steele et al. 2014).
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let z = (self.0 ^ self.0 >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        let z = (z ^ z >> 27).wrapping_mul(0x94D0_49BB_1331_11EB);
+        z ^ z >> 31
+    }
+
+    fn below(&mut self, limit: usize) -> usize {
+        (self.next() % limit.max(1) as u64) as usize
+    }
+}
+
+/// Numbers and words that change what a file means.
+const WORDS: &[&str] = &[
+    "0",
+    "1",
+    "-1",
+    "65535",
+    "4294967295",
+    "4294967296",
+    "18446744073709551615",
+    "1e39",
+    "-0.0",
+    "0.5",
+    "null",
+    "[]",
+    "{}",
+    "\"\"",
+    "5120",
+    "5121",
+    "5123",
+    "5125",
+    "5126",
+    "\"VEC3\"",
+    "\"SCALAR\"",
+    "\"MAT4\"",
+    "true",
+    "[0]",
+    "6",
+];
+
+/// One change: of a byte, of a number in the JSON, of the length, of a piece of the file.
+fn mutate(bytes: &mut Vec<u8>, random: &mut Random) {
+    if bytes.is_empty() {
+        return;
+    }
+    let at = random.below(bytes.len());
+    match random.below(6) {
+        0 => bytes[at] ^= 1 << random.below(8),
+        1 => bytes[at] = random.next() as u8,
+        2 => bytes.truncate(at),
+        3 => {
+            let from = random.below(bytes.len());
+            let count = random.below(16).min(bytes.len() - at.max(from));
+            bytes.copy_within(from..from + count, at);
+        }
+        _ => {
+            // the next number is replaced
+            let digit = |b: &u8| b.is_ascii_digit();
+            let Some(start) = bytes[at..].iter().position(digit).map(|p| at + p) else { return };
+            let end = bytes[start..]
+                .iter()
+                .position(|b| !digit(b) && *b != b'.')
+                .map_or(bytes.len(), |p| start + p);
+            let word = WORDS[random.below(WORDS.len())];
+            let before = end - start;
+            bytes.splice(start..end, word.bytes());
+            // GLB states the length of its JSON: keep it where spaces can
+            if word.len() < before {
+                let fill = std::iter::repeat_n(b' ', before - word.len());
+                bytes.splice(start + word.len()..start + word.len(), fill);
+            }
+        }
+    }
+}
+
+fn try_load(file: &Path, bytes: &[u8]) {
+    let options = LoadOptions { time_s: Some(0.25) };
+    match load_bytes(file, bytes, &options) {
+        Ok(scene) => {
+            check_scene(&scene).unwrap_or_else(|e| panic!("{}: {e}", file.display()));
+            for image in scene.images.iter().filter(|i| i.width * i.height <= 1 << 16) {
+                let _ = decode(image, TextureRole::Normal, Some((5, 3)));
+            }
+        }
+        Err(e) => assert!(!e.to_string().contains('\n'), "{e:?}"),
+    }
+}
+
+#[test]
+fn damaged_files_end_in_a_scene_or_an_error() {
+    /// Larger files take longer and show no more.
+    const FILE_BYTES_MAX: u64 = 64 << 10;
+    const TRIES: u64 = 60;
+    let Some(dir) = scenes_dir() else { return };
+    let files = files_under(&dir.join("samples"), &["gltf", "glb"]);
+    let files: Vec<_> = files.into_iter().filter(|f| f.metadata().unwrap().len() <= FILE_BYTES_MAX).collect();
+    assert!(files.len() > 200);
+    files.par_iter().enumerate().for_each(|(i, file)| {
+        let original = std::fs::read(file).unwrap();
+        for k in 0..TRIES {
+            let mut random = Random(i as u64 * TRIES + k);
+            let mut bytes = original.clone();
+            for _ in 0..=random.below(4) {
+                mutate(&mut bytes, &mut random);
+            }
+            try_load(file, &bytes);
+        }
+    });
+}
+
+#[test]
+fn damaged_obj_files_end_in_a_scene_or_an_error() {
+    let original = "mtllib a.mtl\no one\nv 0 0 0\nv 1 0 0 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\nusemtl m\nf 1/1/1 2/1/1 3/1/1 4/1/1\nf 1 2 3\nl 1 2\n";
+    (0..20_000u64).into_par_iter().for_each(|seed| {
+        let mut random = Random(seed);
+        let mut bytes = original.as_bytes().to_vec();
+        for _ in 0..=random.below(4) {
+            mutate(&mut bytes, &mut random);
+        }
+        try_load(Path::new("damaged.obj"), &bytes);
+    });
+}
+
+#[test]
+fn cases_that_the_fuzzer_kept_return() {
+    let dir = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/corpus/load");
+    let mut count = 0;
+    for entry in std::fs::read_dir(&dir).unwrap_or_else(|e| panic!("{}: {e}", dir.display())) {
+        let bytes = std::fs::read(entry.unwrap().path()).unwrap();
+        let Some((format, bytes)) = bytes.split_first() else { continue };
+        let name = ["fuzz.gltf", "fuzz.glb", "fuzz.obj"][usize::from(*format) % 3];
+        try_load(Path::new(name), bytes);
+        count += 1;
+    }
+    assert!(count > 0, "no cases in {}", dir.display());
+}
