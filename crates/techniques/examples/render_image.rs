@@ -1,6 +1,6 @@
 //! Renders a scene with one technique into a PNG: `cargo run --release --example render_image -- SCENE TECHNIQUE FILE`.
 
-use afterlight_image::Rgba8Image;
+use afterlight_image::{Rgba8Image, write_png};
 use afterlight_techniques::{Params, Renderer, Settings, find, graph::gpu, scene};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -21,6 +21,6 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         println!("{:>24} {:8.3} ms", pass.name, pass.time_ns.unwrap_or(0.0) / 1e6);
     }
     let image = Rgba8Image { width: 640, height: 360, pixels: frame.final_rgba8()? };
-    image.write_png(file.as_ref())?;
+    write_png(file.as_ref(), &image)?;
     Ok(())
 }

@@ -1,6 +1,6 @@
 //! A technique from outside the workspace: its own shader over Afterlight's G-buffer stage, run beside the built-in ones.
 
-use afterlight_image::Rgba8Image;
+use afterlight_image::{Rgba8Image, write_png};
 use afterlight_techniques::{
     Answers, AppendixA, Exactness, Frame, Info, ParamInfo, ParamKind, Params, Renderer, Settings, Technique,
     TechniqueError,
@@ -76,7 +76,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     params.set(&INFO, "levels", "3")?;
     let mut frame = renderer.prepare(&Toon, &params)?;
     let report = frame.run()?;
-    Rgba8Image { width: 320, height: 180, pixels: frame.final_rgba8()? }.write_png(file.as_ref())?;
+    write_png(file.as_ref(), &Rgba8Image { width: 320, height: 180, pixels: frame.final_rgba8()? })?;
     println!("{} passes, {file}", report.passes.len());
     Ok(())
 }
