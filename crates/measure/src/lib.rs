@@ -7,7 +7,7 @@ mod record;
 mod stats;
 
 pub use record::{
-    Buffer, CostRecord, Counters, DeviceRecord, Difference, Memory, PSNR_IDENTICAL_DB, Pass, ProcessRecord, Run, RunResult,
-    SCHEMA, SceneRecord, SettingsRecord, Status,
+    Buffer, CostRecord, Counters, DeviceRecord, Difference, Memory, PSNR_IDENTICAL_DB, Pass, ProcessRecord,
+    Run, RunResult, SCHEMA, SceneRecord, SettingsRecord, Status,
 };
 pub use stats::Spread;
