@@ -206,29 +206,50 @@ fn floor(b: &mut SceneBuilder, material: u32, triangle_count: u32) {
     b.add("floor", &mesh, material);
 }
 
-/// A wall in the XY plane from a curve to the borders of a rectangle around the origin: `inner(s)`
-/// gives the curve's points, the rays from the origin through them the outer ones.
-fn wall_around(
-    mesh: &mut MeshData,
-    divisions: [u32; 2],
-    front: DVec3,
-    radius_m: f64,
+/// A part of a circle about the origin, and of the wall around it up to a rectangle's border.
+#[derive(Clone, Copy)]
+struct Sector {
+    /// Angles of its ends, radians.
     angles: [f64; 2],
-    half_m: DVec2,
-    z: f64,
-) {
-    let position = move |s: f64, t: f64| {
-        let angle = angles[0] + (angles[1] - angles[0]) * s;
-        let direction = DVec2::new(angle.cos(), angle.sin());
-        let reach = (half_m.x / direction.x.abs().max(1e-9)).min(half_m.y / direction.y.abs().max(1e-9));
-        let p = direction * (radius_m + (reach - radius_m) * t);
-        DVec3::new(p.x, p.y, z)
+    /// Divisions along the circle.
+    divisions: u32,
+}
+
+/// Splits the circle from angle 0 to `end_rad` where the rays to the corners of a rectangle of half extents `half_m` cross it, so that
+/// the wall has the rectangle's corners. `divisions` are those of the whole.
+fn sectors(half_m: DVec2, end_rad: f64, divisions: u32) -> Vec<Sector> {
+    let corner = half_m.y.atan2(half_m.x);
+    let corners = [corner, PI - corner, PI + corner, TAU - corner];
+    let mut ends = vec![0.0];
+    ends.extend(corners.into_iter().filter(|&angle| angle < end_rad));
+    ends.push(end_rad);
+    let sector = |angles: [f64; 2]| {
+        let share = (angles[1] - angles[0]) / end_rad;
+        Sector { angles, divisions: ((f64::from(divisions) * share).round() as u32).max(1) }
     };
-    let uv = |s: f64, t: f64| {
-        let p = position(s, t);
-        DVec2::new(p.x, -p.y) * 0.5
-    };
-    mesh.patch(divisions, Front::Along(front), position, uv);
+    ends.windows(2).map(|pair| sector([pair[0], pair[1]])).collect()
+}
+
+impl Sector {
+    /// The unit vector at a fraction of the sector.
+    fn direction(self, s: f64) -> DVec2 {
+        let angle = self.angles[0] + (self.angles[1] - self.angles[0]) * s;
+        DVec2::new(angle.cos(), angle.sin())
+    }
+
+    /// Adds the wall at a `z`, from the circle of `radius_m` to the rectangle.
+    fn wall(self, mesh: &mut MeshData, across: u32, front: DVec3, radius_m: f64, half_m: DVec2, z: f64) {
+        let position = move |s: f64, t: f64| {
+            let direction = self.direction(s);
+            let reach = (half_m.x / direction.x.abs().max(1e-9)).min(half_m.y / direction.y.abs().max(1e-9));
+            (direction * (radius_m + (reach - radius_m) * t)).extend(z)
+        };
+        let uv = |s: f64, t: f64| {
+            let p = position(s, t);
+            DVec2::new(p.x, -p.y) * 0.5
+        };
+        mesh.patch([self.divisions, across], Front::Along(front), position, uv);
+    }
 }
 
 /// Outer walls, aisle ceilings, clerestory and the two ends with their rose windows.
@@ -310,7 +331,11 @@ fn end_walls(b: &mut SceneBuilder, m: &Materials, d: Detail) {
     // modelled around the window's centre, facing +Z, then turned to both ends
     let above = HALL_M.y - ROSE_Y_M;
     let mut wall = d.mesh();
-    wall_around(&mut wall, d.grid([64, 6]), DVec3::Z, ROSE_M, [0.0, TAU], DVec2::new(ROW_Z_M, above), 0.0);
+    let half_m = DVec2::new(ROW_Z_M, above);
+    let [around, across] = d.grid([64, 6]);
+    for sector in sectors(half_m, TAU, around) {
+        sector.wall(&mut wall, across, DVec3::Z, ROSE_M, half_m, 0.0);
+    }
     let lower = ROSE_Y_M - above;
     wall.rectangle(
         d.grid([16, 8]),
@@ -418,16 +443,19 @@ fn arch(d: Detail) -> MeshData {
     let mut mesh = d.mesh();
     let height = AISLE_M - SPRING_M;
     let circle = |s: f64| DVec3::new((PI * s).cos(), (PI * s).sin(), 0.0);
-    let divisions = d.grid([36, 5]);
-    for (z, front) in [(WALL_M, DVec3::Z), (-WALL_M, DVec3::NEG_Z)] {
-        wall_around(&mut mesh, divisions, front, ARCH_M, [0.0, PI], DVec2::new(0.5 * BAY_M, height), z);
+    let half_m = DVec2::new(0.5 * BAY_M, height);
+    let [along, across] = d.grid([36, 5]);
+    for sector in sectors(half_m, PI, along) {
+        for (z, front) in [(WALL_M, DVec3::Z), (-WALL_M, DVec3::NEG_Z)] {
+            sector.wall(&mut mesh, across, front, ARCH_M, half_m, z);
+        }
+        mesh.patch(
+            [sector.divisions, across],
+            Front::Towards(DVec3::ZERO),
+            |s, t| (sector.direction(s) * ARCH_M).extend(WALL_M * (2.0 * t - 1.0)),
+            |s, t| DVec2::new((sector.angles[0] + (sector.angles[1] - sector.angles[0]) * s) * 0.6, 0.34 * t),
+        );
     }
-    mesh.patch(
-        d.grid([36, 4]),
-        Front::Towards(DVec3::ZERO),
-        |s, t| circle(s) * ARCH_M + DVec3::Z * (WALL_M * (2.0 * t - 1.0)),
-        |s, t| DVec2::new(1.8 * s, 0.34 * t),
-    );
     for (radius, thick) in [(ARCH_M + 0.09, 0.07), (ARCH_M + 0.24, 0.035)] {
         let ring = |s: f64| circle(s) * radius + DVec3::Z * WALL_M;
         mesh.tube(d.grid([36, 8]), ring, thick, DVec3::Z, DVec2::new(4.0, 0.4));

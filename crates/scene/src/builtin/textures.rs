@@ -156,17 +156,18 @@ pub(super) fn marble(u: f32, v: f32) -> Texel {
     }
 }
 
-/// Weathered limestone.
+/// Weathered limestone: soft bands, fine grain, a few shallow pits.
 pub(super) fn limestone(u: f32, v: f32) -> Texel {
-    let coarse = fbm(u, v, 4, 5, 71);
-    let fine = fbm(u, v, 32, 3, 83);
-    let pit = smoothstep(0.62, 0.8, fbm(u, v, 24, 2, 97));
-    let warm = mix3([0.80, 0.72, 0.58], [0.66, 0.56, 0.43], coarse);
+    let coarse = fbm(u, v, 3, 5, 71);
+    let fine = fbm(u, v, 48, 3, 83);
+    let band = fbm(0.25 * coarse, v + 0.06 * coarse, 12, 3, 59);
+    let pit = smoothstep(0.7, 0.86, fbm(u, v, 40, 2, 97));
+    let warm = mix3([0.86, 0.8, 0.69], [0.74, 0.66, 0.53], smoothstep(0.25, 0.75, 0.6 * coarse + 0.4 * band));
     Texel {
-        color: mix3(warm, [0.5, 0.41, 0.31], 0.7 * pit).map(|c| c * (0.92 + 0.16 * fine)),
-        height: 0.004 * coarse + 0.0016 * fine - 0.003 * pit,
-        roughness: 0.72 + 0.2 * fine,
-        occlusion: 1.0 - 0.35 * pit,
+        color: mix3(warm, [0.6, 0.51, 0.4], 0.5 * pit).map(|c| c * (0.94 + 0.12 * fine)),
+        height: 0.003 * coarse + 0.0008 * fine - 0.0015 * pit,
+        roughness: 0.7 + 0.2 * fine,
+        occlusion: 1.0 - 0.2 * pit,
         ..Texel::default()
     }
 }
