@@ -1,6 +1,6 @@
 //! Choice of a camera, a camera made to fit, and camera paths.
 
-use std::path::Path;
+use std::{cmp::Ordering, path::Path};
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -210,9 +210,9 @@ fn first_hit_m(scene: &Scene, origin_ws: Vec3, direction_ws: Vec3) -> f32 {
 fn hits_box(bounds: &Aabb, origin: Vec3, direction: Vec3) -> bool {
     let inverse = direction.recip();
     let (t0, t1) = ((bounds.min - origin) * inverse, (bounds.max - origin) * inverse);
-    // a direction with a zero gives NaN only for an origin in the face's plane: min and max drop it
     let enter = t0.min(t1).max_element().max(0.0);
-    !(enter > t0.max(t1).min_element())
+    // a direction with a zero gives NaN for an origin in a face's plane: such a box may be met
+    enter.partial_cmp(&t0.max(t1).min_element()) != Some(Ordering::Greater)
 }
 
 /// Parameter of the hit of a ray with a triangle, from either side (Möller, Trumbore 1997).

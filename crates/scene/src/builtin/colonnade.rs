@@ -645,7 +645,7 @@ fn plants(b: &mut SceneBuilder, m: &Materials, d: Detail) {
         let angle = TAU * s.fract();
         DVec3::new(angle.cos() * 0.31 * t, 0.44 + 0.03 * (1.0 - t * t), -angle.sin() * 0.31 * t)
     };
-    soil.patch(d.grid([24, 2]), Front::Along(DVec3::Y), disc, |s, t| DVec2::new(s, t));
+    soil.patch(d.grid([24, 2]), Front::Along(DVec3::Y), disc, DVec2::new);
     let soil = b.mesh("soil", &soil, m.soil);
     let shrubs = [0, 1, 2].map(|kind| {
         let mut mesh = d.mesh();

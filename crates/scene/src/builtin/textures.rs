@@ -199,7 +199,7 @@ pub(super) fn cloth(ground: [f32; 3], figure: [f32; 3]) -> impl Fn(f32, f32) -> 
     move |u, v| {
         let threads = 96.0;
         let (x, y) = (u * threads, v * threads);
-        let over = (x as u32 + y as u32) % 2 == 0;
+        let over = (x as u32 + y as u32).is_multiple_of(2);
         let across = if over { x } else { y }.fract() - 0.5;
         let thread = (1.0 - 4.0 * across * across).max(0.0).sqrt();
         let lozenge = ((2.0 * u).fract() - 0.5).abs() + ((2.0 * v).fract() - 0.5).abs();
@@ -294,7 +294,7 @@ pub(super) fn stained_glass(u: f32, v: f32) -> Texel {
     let petal = (dy.atan2(dx) / TAU + 0.5) * 12.0;
     let ring = (radius * 3.5) as u32;
     let near_petal = (petal.fract() - 0.5).abs() * radius;
-    let came = smoothstep(0.46, 0.48, near_petal / radius.max(0.2) + 0.0).max(smoothstep(
+    let came = smoothstep(0.46, 0.48, near_petal / radius.max(0.2)).max(smoothstep(
         0.46,
         0.49,
         ((radius * 3.5).fract() - 0.5).abs(),
