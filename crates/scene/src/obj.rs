@@ -15,13 +15,8 @@ use crate::{
 /// Loads an `.obj` from its bytes; `file` names it and gives the folder of materials and textures.
 pub(crate) fn load(file: &Path, bytes: &[u8]) -> Result<Scene, SceneError> {
     let mut scene = Scene::default();
-    let options = tobj::LoadOptions {
-        single_index: true,
-        triangulate: true,
-        ignore_points: true,
-        ignore_lines: true,
-        ..Default::default()
-    };
+    let options =
+        tobj::LoadOptions { single_index: true, triangulate: true, ignore_points: true, ignore_lines: true };
     let parsed =
         tobj::load_obj_buf(&mut BufReader::new(Cursor::new(bytes)), &options, |name| load_mtl(file, name));
     let (models, materials) =

@@ -86,7 +86,7 @@ fn on_sponza_with_100_lights() {
 #[test]
 fn at_odd_sizes() {
     let gpu = afterlight_testkit::gpu();
-    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=5000");
+    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=17000&texture=64");
     for size in [(1, 1), (17, 3), (3, 33), (640, 360)] {
         all_agree(&stage, &stage.settings(size, 20), &format!("{size:?}"), 1);
     }
@@ -102,7 +102,7 @@ fn at_2160p() {
 #[test]
 fn with_0_1_and_10_000_lights() {
     let gpu = afterlight_testkit::gpu();
-    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=3000");
+    let stage = Stage::new(&gpu, "builtin:intersect");
     for count in [1, 10_000] {
         all_agree(&stage, &stage.settings((48, 27), count), &format!("{count} lights"), 1);
     }
@@ -114,7 +114,7 @@ fn with_0_1_and_10_000_lights() {
 #[test]
 fn with_the_camera_in_a_wall_and_looking_away() {
     let gpu = afterlight_testkit::gpu();
-    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=5000");
+    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=17000&texture=64");
     let bounds = stage.scene.bounds_ws();
     let views = [
         ("in a wall", bounds.min + bounds.size() * Vec3::new(0.5, 0.3, 0.002), bounds.center()),
@@ -132,7 +132,7 @@ fn with_the_camera_in_a_wall_and_looking_away() {
 fn inside_light_volumes_and_with_all_kinds_of_lights() {
     use afterlight_techniques::scene::{Light, LightKind};
     let gpu = afterlight_testkit::gpu();
-    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=5000");
+    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=17000&texture=64");
     let mut settings = stage.settings((96, 54), 8);
     let eye = settings.camera.eye_ws();
     let light = |kind, range_m| Light {

@@ -321,10 +321,10 @@ fn apply_filter(filter: &str, stride: u64, bytes: &mut [u8]) -> Option<()> {
     match (filter, stride) {
         ("NONE", _) => {}
         ("OCTAHEDRAL", 4) => meshopt::decode_filter_oct(bytemuck::cast_slice_mut::<u8, [i8; 4]>(bytes)),
-        ("OCTAHEDRAL", 8) => with_words::<[i16; 4]>(bytes, |v| meshopt::decode_filter_oct(v)),
-        ("QUATERNION", 8) => with_words::<[i16; 4]>(bytes, |v| meshopt::decode_filter_quat(v)),
+        ("OCTAHEDRAL", 8) => with_words::<[i16; 4]>(bytes, meshopt::decode_filter_oct),
+        ("QUATERNION", 8) => with_words::<[i16; 4]>(bytes, meshopt::decode_filter_quat),
         ("EXPONENTIAL", s) if s.is_multiple_of(4) => {
-            with_words::<[u32; 1]>(bytes, |v| meshopt::decode_filter_exp(v));
+            with_words::<[u32; 1]>(bytes, meshopt::decode_filter_exp);
         }
         _ => return None,
     }

@@ -157,7 +157,8 @@ fn read_values<const N: usize>(
     let layout = accessors.layout(output)?;
     let at = || format!("{at}, sampler output {}", accessors.place(output));
     let float = layout.component == ComponentType::F32;
-    if !float && !(N == 4 && layout.normalized) {
+    let fits = float || N == 4 && layout.normalized;
+    if !fits {
         let expected = if N == 4 { "F32 or normalized integers" } else { "F32" };
         return Err(SceneError::invalid(accessors.file, at(), format!("{:?}", layout.component), expected));
     }
