@@ -382,29 +382,41 @@ mod tests {
         twin.tangents_os
     }
 
-    /// A grid of heights with texture coordinates that are mirrored about a column.
-    fn grid(
-        heights: &[f32],
-        mirror: bool,
-        hole: bool,
-    ) -> (Vec<[f32; 3]>, Vec<[f32; 3]>, Vec<[f32; 2]>, Vec<u32>) {
-        const N: u32 = 6;
-        let (mut positions_os, mut normals_os, mut uvs, mut indices) = (vec![], vec![], vec![], vec![]);
-        for i in 0..N * N {
-            let (x, y, z) = ((i % N) as f32, (i / N) as f32, heights[i as usize]);
-            positions_os.push([x, y, z]);
-            normals_os.push(Vec3::new(0.3 * z, 0.2, 1.0).normalize().to_array());
-            uvs.push([if mirror { (x - 2.0).abs() } else { x + 0.3 * z }, y]);
+    /// A mesh that owns what a [`Surface`] borrows.
+    #[derive(Default)]
+    struct Grid {
+        positions_os: Vec<[f32; 3]>,
+        normals_os: Vec<[f32; 3]>,
+        uvs: Vec<[f32; 2]>,
+        indices: Vec<u32>,
+    }
+
+    impl Grid {
+        /// A grid of heights, its texture coordinates mirrored about a column if asked for.
+        fn new(heights: &[f32], mirror: bool, broken: bool) -> Self {
+            const N: u32 = 6;
+            let mut grid = Self::default();
+            for i in 0..N * N {
+                let (x, y, z) = ((i % N) as f32, (i / N) as f32, heights[i as usize]);
+                grid.positions_os.push([x, y, z]);
+                grid.normals_os.push(Vec3::new(0.3 * z, 0.2, 1.0).normalize().to_array());
+                grid.uvs.push([if mirror { (x - 2.0).abs() } else { x + 0.3 * z }, y]);
+            }
+            for i in (0..N * (N - 1)).filter(|i| i % N != N - 1) {
+                grid.indices.extend([i, i + 1, i + N, i + 1, i + N + 1, i + N]);
+            }
+            if broken {
+                // a degenerate face, one without texture area, and an edge with three faces
+                grid.indices.extend([0, 0, 1, 7, 8, 14]);
+                grid.uvs[20] = grid.uvs[21];
+            }
+            grid
         }
-        for i in (0..N * (N - 1)).filter(|i| i % N != N - 1) {
-            indices.extend([i, i + 1, i + N, i + 1, i + N + 1, i + N]);
+
+        fn surface(&self) -> Surface<'_> {
+            let Self { positions_os, normals_os, uvs, indices } = self;
+            Surface { positions_os, normals_os, uvs, indices }
         }
-        if hole {
-            // a degenerate face, one without texture area, and an edge with three faces
-            indices.extend([0, 0, 1, 7, 8, 14]);
-            uvs[20] = uvs[21];
-        }
-        (positions_os, normals_os, uvs, indices)
     }
 
     proptest! {
@@ -412,10 +424,10 @@ mod tests {
         fn tangents_are_those_of_the_reference(
             heights in prop::collection::vec(-1.0f32..1.0, 36),
             mirror in any::<bool>(),
-            hole in any::<bool>(),
+            broken in any::<bool>(),
         ) {
-            let (positions_os, normals_os, uvs, indices) = grid(&heights, mirror, hole);
-            let surface = Surface { positions_os: &positions_os, normals_os: &normals_os, uvs: &uvs, indices: &indices };
+            let grid = Grid::new(&heights, mirror, broken);
+            let surface = grid.surface();
             for (corner, (ours, theirs)) in corner_tangents(&surface).iter().zip(twin(&surface)).enumerate() {
                 if let Some(theirs) = theirs {
                     prop_assert!((*ours - theirs).length() < 2e-3, "corner {}: {} and {}", corner, ours, theirs);

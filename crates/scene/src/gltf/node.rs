@@ -92,9 +92,6 @@ pub(super) fn place(file: &Path, root: &Root, scene: &mut Scene) -> Result<Place
             (0..root.nodes.len()).filter(|&n| !is_child[n]).collect()
         }
     };
-    if let Some(name) = chosen.and_then(|s| root.scenes[s].name.clone()) {
-        scene.name = crate::error::one_line(&name);
-    }
     let mut placement = Placement { scene_node: vec![None; root.nodes.len()], order: Vec::new() };
     let mut stack: Vec<(usize, Option<u32>)> = roots.into_iter().rev().map(|n| (n, None)).collect();
     while let Some((index, parent)) = stack.pop() {
