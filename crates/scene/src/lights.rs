@@ -14,7 +14,7 @@ const FLAT_BOX_THICKNESS: f32 = 0.1;
 /// Makes `count` point lights in a box: position uniform in the box, full saturation hue, range
 /// `r = (8 V / (count 4/3 π))^(1/3)` so that about 8 overlap at a point, `color r²` candela.
 ///
-/// A [`SplitMix64`] from `seed` gives four numbers a light: x, y, z as fractions of the box from its
+/// A SplitMix64 generator from `seed` gives four numbers a light: x, y, z as fractions of the box from its
 /// minimum, and the hue. All arithmetic is `f32`.
 ///
 /// The recipe needs a volume. A box that is flat along an axis is taken to be thicker there, by a tenth of

@@ -486,6 +486,10 @@ fn bad_values_are_one_line_errors() {
             let a = d.accessor(json!({"componentType": 5126, "count": 1u64 << 40, "type": "VEC3"}));
             d.json["meshes"][0]["primitives"][0]["attributes"]["POSITION"] = json!(a);
         }),
+        ("vertices: found 480000000, expected at most 4194304", &|d| {
+            let a = d.accessor(json!({"componentType": 5126, "count": 16_000_000, "type": "VEC3"}));
+            d.json["meshes"] = json!([{"primitives": vec![json!({"attributes": {"POSITION": a}}); 30]}]);
+        }),
         ("0 bytes", &|d| {
             d.json["images"] = json!([{"uri": "data:image/png;base64,"}]);
             d.json["textures"] = json!([{"source": 0}]);

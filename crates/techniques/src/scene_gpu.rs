@@ -379,8 +379,8 @@ fn material_records(materials: &[Material], table: &TextureTable) -> (Vec<Materi
                 roughness_factor: m.roughness_factor,
                 normal_scale: m.normal_scale,
                 occlusion_strength: m.occlusion_strength,
-                flags: u32::from(m.unlit) * MATERIAL_UNLIT
-                    | u32::from(m.double_sided) * MATERIAL_DOUBLE_SIDED,
+                flags: (u32::from(m.unlit) * MATERIAL_UNLIT)
+                    | (u32::from(m.double_sided) * MATERIAL_DOUBLE_SIDED),
                 uv_transform: first,
                 base_color_slot: base_color,
                 metallic_roughness_slot: metallic_roughness,

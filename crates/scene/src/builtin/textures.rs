@@ -115,8 +115,14 @@ fn noise(u: f32, v: f32, period: u32, seed: u32) -> f32 {
     let (x, y) = (u * period as f32, v * period as f32);
     let (x0, y0) = (x.floor(), y.floor());
     let (fx, fy) = (smooth(x - x0), smooth(y - y0));
-    let wrap = |i: f32, k: u32| (i as i32).rem_euclid(period as i32) as u32 % period + k;
-    let corner = |i: u32, j: u32| hash(wrap(x0, i) % period, wrap(y0, j) % period, seed);
+    // the cell's borders, wrapped without a division by an integer: this is the textures' innermost loop
+    let borders = |i: f32| {
+        let low = (i - (i / period as f32).floor() * period as f32) as u32;
+        let low = if low >= period { 0 } else { low };
+        [low, if low + 1 == period { 0 } else { low + 1 }]
+    };
+    let (columns, rows) = (borders(x0), borders(y0));
+    let corner = |i: usize, j: usize| hash(columns[i], rows[j], seed);
     mix(mix(corner(0, 0), corner(1, 0), fx), mix(corner(0, 1), corner(1, 1), fx), fy)
 }
 

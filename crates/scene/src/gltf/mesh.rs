@@ -13,10 +13,14 @@ use rayon::prelude::*;
 use super::{accessor::Accessors, check};
 use crate::{Aabb, Material, Mesh, Scene, SceneError, VertexAttributes, tangent};
 
-/// Most vertices of a scene (5 GiB of them) and most indices (4 GiB): a small file can name one
-/// accessor many times, so its own size does not bound them.
+/// Most vertices of a scene (5 GiB of them) and most indices (4 GiB).
 const VERTEX_COUNT_MAX: u64 = 1 << 27;
 const INDEX_COUNT_MAX: u64 = 1 << 30;
+
+/// Vertices and indices that any file may have, and how many more a byte of its buffers allows. A
+/// small file can name one accessor many times, or one without bytes; real ones stay far below.
+const COUNT_FREE: u64 = 1 << 22;
+const COUNT_PER_BYTE: u64 = 4;
 
 /// A mesh in one of its shapes.
 #[derive(Clone, Debug, Default)]
@@ -276,9 +280,10 @@ fn check_size(accessors: &Accessors, jobs: &[Job], shared: &[Streams]) -> Result
             vertices += vertex_count(&job.streams).max(list_count);
         }
     }
-    for (what, found, limit) in
-        [("vertices", vertices, VERTEX_COUNT_MAX), ("indices", indices, INDEX_COUNT_MAX)]
-    {
+    let bytes: u64 = accessors.views.iter().flatten().map(|v| v.len() as u64).sum();
+    let paid = COUNT_FREE.max(bytes.saturating_mul(COUNT_PER_BYTE));
+    let (vertex_max, index_max) = (VERTEX_COUNT_MAX.min(paid), INDEX_COUNT_MAX.min(paid));
+    for (what, found, limit) in [("vertices", vertices, vertex_max), ("indices", indices, index_max)] {
         if found > limit {
             let file = accessors.file.to_owned();
             return Err(SceneError::TooLarge { file, what: what.to_owned(), found, limit });

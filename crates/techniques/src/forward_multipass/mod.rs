@@ -143,7 +143,7 @@ fn screen_rect(clip_from_world: Mat4, bounds: &Aabb, whole: Rect) -> Option<Rect
     // A pixel more on each side than rounding can move a bound.
     let low = ((low * 0.5 + 0.5) * size - 1.0).floor().max(glam::Vec2::ZERO);
     let high = ((high * 0.5 + 0.5) * size + 1.0).ceil().min(size);
-    (low.cmplt(high).all()).then(|| Rect {
+    low.cmplt(high).all().then_some(Rect {
         x_px: low.x as u32,
         y_px: low.y as u32,
         width_px: (high.x - low.x) as u32,
