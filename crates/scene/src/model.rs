@@ -317,7 +317,13 @@ pub struct Scene {
 
 impl Default for Sampler {
     fn default() -> Self {
-        Self { mag_nearest: false, min_nearest: false, mip: MipMode::Linear, wrap_u: Wrap::Repeat, wrap_v: Wrap::Repeat }
+        Self {
+            mag_nearest: false,
+            min_nearest: false,
+            mip: MipMode::Linear,
+            wrap_u: Wrap::Repeat,
+            wrap_v: Wrap::Repeat,
+        }
     }
 }
 
@@ -463,8 +469,15 @@ impl Scene {
 
 impl VertexAttributes {
     /// Packs attributes. `normal_os` and `tangent_os` need not be unit; `handedness` is the sign
-    /// of the bitangent (glTF's TANGENT.w). Angular error below 1e-4 rad (tangent), 5e-5 (normal).
-    pub fn pack(normal_os: Vec3, tangent_os: Vec3, handedness: f32, uv0: Vec2, uv1: Vec2, color: [f32; 4]) -> Self {
+    /// of the bitangent (glTF's TANGENT.w). Angular error: at most 6.5e-5 rad (normal), 1.5e-4 (tangent), as tested in the oracle.
+    pub fn pack(
+        normal_os: Vec3,
+        tangent_os: Vec3,
+        handedness: f32,
+        uv0: Vec2,
+        uv1: Vec2,
+        color: [f32; 4],
+    ) -> Self {
         let sign_bit = u32::from(handedness < 0.0) << 16;
         Self {
             normal_os_oct: oct_encode(normal_os),
