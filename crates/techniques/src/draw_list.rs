@@ -11,13 +11,25 @@ use crate::scene_gpu::{BUCKETS, DrawInfo, SceneGpu};
 pub struct DrawOptions {
     /// Leaves out draws whose bounds lie outside the view.
     pub cull: bool,
-    /// Orders the draws of each bucket from near to far, so that early depth tests save shading.
-    pub near_first: bool,
+    /// Order of the draws of each bucket.
+    pub order: DrawOrder,
+}
+
+/// Order of draws: from near to far, early depth tests save shading.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DrawOrder {
+    /// By the distance of the nearest point of their bounds. Failed: on Sponza at 3840×2160 on an H200 it shades 26.5 M
+    /// fragments, as many as no order at all (27.0 M); large draws that reach near the eye hide little.
+    Near,
+    /// By the distance of the centre of their bounds: 17.0 M fragments there, the ID pass in 4.5 ms instead of 6.0.
+    Center,
+    /// As in the scene.
+    Scene,
 }
 
 impl Default for DrawOptions {
     fn default() -> Self {
-        Self { cull: true, near_first: true }
+        Self { cull: true, order: DrawOrder::Center }
     }
 }
 
@@ -79,9 +91,11 @@ impl DrawList {
             };
             let mut keyed: Vec<(f32, u32)> = (first..end)
                 .filter(in_view)
-                .map(|draw| (distance_sq(&scene.draw_infos[draw as usize].bounds_ws, eye_ws), draw))
+                .map(|draw| {
+                    (self.options.order.key(&scene.draw_infos[draw as usize].bounds_ws, eye_ws), draw)
+                })
                 .collect();
-            if self.options.near_first {
+            if self.options.order != DrawOrder::Scene {
                 // Draws of one distance keep the scene's order, so that equal depths resolve alike in every technique.
                 keyed.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
             }
@@ -108,8 +122,19 @@ pub(crate) fn command(info: &DrawInfo, draw: u32) -> DrawCommand {
     }
 }
 
+impl DrawOrder {
+    /// What draws are sorted by.
+    fn key(self, bounds: &Aabb, eye_ws: Vec3) -> f32 {
+        match self {
+            Self::Near => distance_sq(bounds, eye_ws),
+            Self::Center => bounds.center().distance_squared(eye_ws),
+            Self::Scene => 0.0,
+        }
+    }
+}
+
 /// Squared distance from a point to a box, 0 inside.
-pub(crate) fn distance_sq(bounds: &Aabb, point: Vec3) -> f32 {
+fn distance_sq(bounds: &Aabb, point: Vec3) -> f32 {
     point.clamp(bounds.min.min(bounds.max), bounds.max.max(bounds.min)).distance_squared(point)
 }
 

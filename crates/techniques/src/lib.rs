@@ -36,7 +36,7 @@ mod technique;
 mod textures;
 pub mod volumes;
 
-pub use draw_list::DrawOptions;
+pub use draw_list::{DrawOptions, DrawOrder};
 pub use error::TechniqueError;
 pub use frame::Frame;
 pub use light_list::LightList;

@@ -48,9 +48,9 @@ pub const COMMON: &[ParamInfo] = &[
     },
     ParamInfo {
         key: "order",
-        summary: "order of draws: near to far, or as in the scene",
-        kind: ParamKind::Choice { values: &["near", "scene"] },
-        default: "near",
+        summary: "order of draws: by the nearest point or the centre of their bounds, or as in the scene",
+        kind: ParamKind::Choice { values: &["center", "near", "scene"] },
+        default: "center",
     },
 ];
 

@@ -11,7 +11,7 @@ use afterlight_shader::{Shader, structs::FrameConstants};
 use glam::{Mat4, Vec3, Vec4};
 
 use crate::{
-    draw_list::{DrawList, DrawOptions},
+    draw_list::{DrawList, DrawOptions, DrawOrder},
     error::TechniqueError,
     frame::{Frame, FrameBuffers},
     light_list::LightList,
@@ -164,7 +164,11 @@ impl Renderer {
         }
         let options = DrawOptions {
             cull: params.text(info, "cull") == "frustum",
-            near_first: params.text(info, "order") == "near",
+            order: match params.text(info, "order") {
+                "near" => DrawOrder::Near,
+                "scene" => DrawOrder::Scene,
+                _ => DrawOrder::Center,
+            },
         };
         let settings = &self.settings;
         let view = View::new(settings);
