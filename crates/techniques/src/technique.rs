@@ -94,7 +94,7 @@ pub struct Info {
     pub appendix_a: AppendixA,
     /// Exact or approximate.
     pub exactness: Exactness,
-    /// Its parameters besides those that all have ([`crate::params::COMMON`]).
+    /// Its parameters besides those that all have ([`Params::known`]).
     pub params: &'static [ParamInfo],
     /// What it needs beyond what the program needs.
     pub needs: &'static [Need],
