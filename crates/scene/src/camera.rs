@@ -19,8 +19,8 @@ const INTERIOR_FOV_DEG: f32 = 60.0;
 const EXTERIOR_FOV_DEG: f32 = 45.0;
 /// Height of a standing person's eye, metres.
 const EYE_HEIGHT_M: f32 = 1.7;
-/// Most triangles whose solid angle is summed to tell an interior from an object.
-const SOLID_ANGLE_TRIANGLES_MAX: u64 = 200_000;
+/// Most triangles looked at to tell an interior from an object.
+const INTERIOR_TRIANGLES_MAX: u64 = 200_000;
 
 /// The camera that `--camera` asks for: a name, an index into [`Scene::cameras`], or
 /// `x,y,z,tx,ty,tz,fov_deg` (eye, target, vertical angle of view in degrees; near plane 0.1 m).
@@ -80,9 +80,8 @@ fn from_numbers(spec: &str) -> Option<Camera> {
 
 /// A camera made to fit the scene.
 ///
-/// The signed solid angles of the triangles, seen from the centre of the bounds, tell what the scene is: where
-/// front faces (double-sided ones count half as front, half as back) cover clearly more than back
-/// faces and more than half the sphere, it is an interior. Then the eye stands inside near one end
+/// What is nearest to the centre of the bounds in each direction tells what the scene is: where most of it shows its
+/// front (double-sided triangles count half), it is an interior. Then the eye stands inside near one end
 /// of the longest horizontal axis, before what blocks the view from the centre, a fifth of the height up
 /// (1.7 m where the scene is higher than that and a fifth is less), and looks along the axis. Else
 /// the bounding sphere is framed from the front (+Z in glTF), slightly from above.
@@ -133,31 +132,53 @@ fn interior_camera(scene: &Scene, bounds_ws: &Aabb, near_m: f32) -> Camera {
     Camera::look_at("default", eye_ws, eye_ws - back_ws, INTERIOR_FOV_DEG.to_radians(), near_m)
 }
 
-/// Whether front faces surround a point.
+/// Whether the nearest surfaces around a point show it their fronts.
+///
+/// Each triangle stands for the direction of its centroid; of the triangles in one direction the nearest counts, so that the
+/// outer walls of a building do not. Triangles seen edge-on tell nothing, double-sided ones count half.
 fn is_interior(scene: &Scene, point_ws: Vec3) -> bool {
     let total = scene.triangle_count();
     // odd, so that quads split in two triangles are not seen by one half alone
-    let stride = (total.div_ceil(SOLID_ANGLE_TRIANGLES_MAX) | 1) as usize;
-    let (mut front_sr, mut back_sr, mut skip) = (0.0, 0.0, 0);
+    let stride = (total.div_ceil(INTERIOR_TRIANGLES_MAX) | 1) as usize;
+    let mut nearest = [(f32::INFINITY, 0.0f32); DIRECTION_BINS];
+    let mut skip = 0;
     for instance in &scene.instances {
         let material = scene.materials.get(scene.meshes[instance.mesh as usize].material as usize);
         let double_sided = material.is_some_and(|m| m.double_sided);
         let triangle_count = scene.meshes[instance.mesh as usize].index_count as usize / 3;
         while skip < triangle_count {
-            let corners = world_triangle(scene, instance, skip);
-            let solid_sr = signed_solid_angle_sr(corners, point_ws) * stride as f64;
-            if double_sided {
-                front_sr += 0.5 * solid_sr.abs();
-                back_sr += 0.5 * solid_sr.abs();
-            } else {
-                *(if solid_sr > 0.0 { &mut front_sr } else { &mut back_sr }) += solid_sr.abs();
-            }
+            let [a, b, c] = world_triangle(scene, instance, skip);
             skip += stride;
+            let to_centroid = (a + b + c) / 3.0 - point_ws;
+            let distance_m = to_centroid.length();
+            let normal = (b - a).cross(c - a);
+            let facing = -normal.dot(to_centroid);
+            // an angle of less than six degrees between triangle and direction
+            if !distance_m.is_finite() || facing.abs() <= 0.1 * normal.length() * distance_m {
+                continue;
+            }
+            let bin = &mut nearest[direction_bin(to_centroid)];
+            if distance_m < bin.0 {
+                *bin = (distance_m, if double_sided { 0.5 } else { f32::from(u8::from(facing > 0.0)) });
+            }
         }
         skip -= triangle_count;
     }
-    // one tenth: rounding, and the error of taking every n-th triangle
-    front_sr > 1.1 * back_sr && front_sr > 2.0 * std::f64::consts::PI
+    let seen = nearest.iter().filter(|(distance_m, _)| distance_m.is_finite());
+    let (front, count) = seen.fold((0.0, 0), |(front, count), bin| (front + bin.1, count + 1));
+    count > 0 && front > 0.6 * count as f32
+}
+
+/// Directions told apart: 4×4 on each side of a cube.
+const DIRECTION_BINS: usize = 6 * 4 * 4;
+
+/// The bin of a direction of any length.
+fn direction_bin(direction: Vec3) -> usize {
+    let axis = direction.abs().max_position();
+    let (u, v) = (direction[(axis + 1) % 3], direction[(axis + 2) % 3]);
+    let largest = direction[axis].abs();
+    let cell = |x: f32| ((x / largest * 0.5 + 0.5) * 4.0).clamp(0.0, 3.0) as usize;
+    (axis * 2 + usize::from(direction[axis] < 0.0)) * 16 + cell(u) * 4 + cell(v)
 }
 
 /// Corners of a triangle of an instance, counter-clockwise from its front whatever the instance mirrors.
@@ -170,15 +191,6 @@ fn world_triangle(scene: &Scene, instance: &Instance, triangle: usize) -> [Vec3;
     };
     let mirrored = instance.world_from_object.matrix3.determinant() < 0.0;
     if mirrored { [corner(0), corner(2), corner(1)] } else { [corner(0), corner(1), corner(2)] }
-}
-
-/// Solid angle of a triangle seen from a point, positive where its front is seen (Van Oosterom, Strackee 1983).
-fn signed_solid_angle_sr(corners_ws: [Vec3; 3], point_ws: Vec3) -> f64 {
-    let [a, b, c] = corners_ws.map(|p| (p - point_ws).as_dvec3());
-    let (la, lb, lc) = (a.length(), b.length(), c.length());
-    let denominator = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
-    let angle = -2.0 * a.dot(b.cross(c)).atan2(denominator);
-    if angle.is_finite() { angle } else { 0.0 }
 }
 
 /// Distance to the first triangle along a unit direction, metres; infinite where there is none.
