@@ -361,6 +361,6 @@ mod tests {
             chosen[index].params.text(chosen[index].technique.info(), key).to_owned()
         };
         assert_eq!((text(0, "cull"), text(1, "cull")), ("none".into(), "none".into()));
-        assert_eq!((text(0, "order"), text(1, "order")), ("near".into(), "scene".into()));
+        assert_eq!((text(0, "order"), text(1, "order")), ("center".into(), "scene".into()));
     }
 }

@@ -154,7 +154,7 @@ fn interface_of_a_vertex_and_a_fragment_shader() {
     );
     assert_eq!(list(0, true), [(1, "uv".into(), 2, Scalar::Float), (3, "id".into(), 1, Scalar::Uint)]);
     assert_eq!(list(1, true), [(0, "color".into(), 4, Scalar::Float)]);
-    assert_eq!(compiled[1].shader.name, "t/a.frag.glsl#mask");
+    assert_eq!(compiled[1].shader.name, "t/a.frag#mask");
     assert_eq!((compiled[0].shader.stage, compiled[1].shader.stage), (Stage::Vertex, Stage::Fragment));
 }
 
