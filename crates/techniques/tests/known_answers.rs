@@ -84,9 +84,9 @@ fn a_lit_sphere_matches_its_closed_form() {
         };
         let error = worst(0.5);
         println!("{}: relative error {error:.5}", technique.info().id);
-        // Measured: 0.0046 (forward), 0.0081 (deferred family, 8-bit roughness and base colour).
-        assert!(error < 0.012, "{}: relative error {error}", technique.info().id);
-        assert!(worst(0.52) > 0.012, "a roughness larger by 0.02 goes unseen");
+        // Measured on lavapipe: 0.0079; 0.0086 through the G-buffer's 8 bits of roughness and base colour.
+        assert!(error < 0.010, "{}: relative error {error}", technique.info().id);
+        assert!(worst(0.52) > 0.010, "a roughness larger by 0.02 goes unseen");
     }
 }
 
@@ -145,8 +145,9 @@ fn forward_agrees_with_f64() {
         };
         let error = worst(&settings.lights);
         println!("{source}: relative error {error:.5}");
-        assert!(error < 0.005, "{source}: relative error {error}");
-        assert!(worst(&wider(&settings.lights, 1.02)) > 0.005, "ranges larger by two percent go unseen");
+        // Measured on lavapipe: 0.0009; RGBA16F rounds to 0.0005.
+        assert!(error < 0.002, "{source}: relative error {error}");
+        assert!(worst(&wider(&settings.lights, 1.02)) > 0.002, "ranges larger by two percent go unseen");
     }
 }
 
