@@ -264,9 +264,6 @@ impl CommonArgs {
         if self.indirect != Indirect::None {
             return not_yet("--indirect", &name_of(self.indirect), "none");
         }
-        if self.view != "final" {
-            return not_yet("--view", &format!("{:?}", self.view), "final");
-        }
         Ok(())
     }
 }
@@ -330,7 +327,6 @@ mod tests {
             ["--post", "fxaa"],
             ["--shadows", "map"],
             ["--indirect", "rsm"],
-            ["--view", "normals"],
             ["--shadow-map-size", "512"],
         ] {
             let failure = compare(&option).common.check().expect_err("is refused");

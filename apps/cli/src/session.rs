@@ -190,6 +190,7 @@ impl Session {
             lights,
             environment: scene.environment,
             keep_hdr,
+            view: common.view.clone(),
             ..Settings::for_scene(&scene, common.width, common.height)
         };
         let bar = progress.bar("textures", scene.images.len() as u64);

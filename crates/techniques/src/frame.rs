@@ -130,6 +130,15 @@ impl Frame<'_> {
         self.device.depth_stencil_format()
     }
 
+    /// Depth with stencil in four bytes a sample where the device has it, else [`Self::depth_stencil_format`].
+    pub fn small_depth_stencil_format(&self) -> vk::Format {
+        let wanted = vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT | vk::FormatFeatureFlags::SAMPLED_IMAGE;
+        match self.device.format_supports(vk::Format::D24_UNORM_S8_UINT, wanted) {
+            true => vk::Format::D24_UNORM_S8_UINT,
+            false => self.depth_stencil_format(),
+        }
+    }
+
     /// What the device can do.
     pub fn features(&self) -> &gpu::Features {
         self.device.features()

@@ -19,19 +19,33 @@ fn counts(device: &gpu::Device) -> Vec<u32> {
     [4, 8].into_iter().filter(|count| device.features().supports_samples(*count, false)).collect()
 }
 
-/// Every technique that renders several samples, with every value of its `lights` parameter.
+/// Parameters that change how a technique works, each with the values that are compared.
+const COMPARED: &[(&str, &[&str])] = &[("lights", &["all", "tiled"]), ("fill", &["compute", "raster"])];
+
+/// A technique's parameters from `key=value` words.
+fn params(technique: &dyn Technique, sets: &[(&str, &str)]) -> Params {
+    let mut params = Params::default();
+    for (key, value) in sets {
+        params.set(technique.info(), key, value).unwrap_or_else(|e| panic!("{e}"));
+    }
+    params
+}
+
+/// Every technique that renders several samples, with every value of the compared parameters.
 fn variants() -> Vec<(&'static dyn Technique, Params, String)> {
     let mut all = Vec::new();
     for technique in registry().iter().copied().filter(|t| t.info().samples.contains(&4)) {
         let info = technique.info();
-        let values: &[&str] =
-            if info.params.iter().any(|p| p.key == "lights") { &["all", "tiled"] } else { &[""] };
-        for value in values {
-            let mut params = Params::default();
-            if !value.is_empty() {
-                params.set(info, "lights", value).unwrap_or_else(|e| panic!("{e}"));
-            }
-            all.push((technique, params, format!("{} {value}", info.id)));
+        let mut sets: Vec<Vec<(&str, &str)>> = vec![Vec::new()];
+        for (key, values) in COMPARED.iter().filter(|(key, _)| info.params.iter().any(|p| p.key == *key)) {
+            sets = sets
+                .iter()
+                .flat_map(|set| values.iter().map(|value| [&set[..], &[(*key, *value)]].concat()))
+                .collect();
+        }
+        for set in sets {
+            let words: Vec<&str> = set.iter().map(|(_, value)| *value).collect();
+            all.push((technique, params(technique, &set), format!("{} {}", info.id, words.join(" "))));
         }
     }
     all
@@ -87,5 +101,80 @@ fn one_sample_is_caught() {
         let several = stage.image(forward, &Settings { samples, ..settings.clone() });
         let db = psnr(&stage.image(forward, &settings), &several);
         assert!(db < MIN_PSNR_DB - 5.0, "a mutant within the bound: {db:.2} dB");
+    }
+}
+
+/// `gbuffer-list` with parameters, and the pixels of an image that are not black.
+fn list_image(stage: &Stage, settings: &Settings, sets: &[(&str, &str)]) -> afterlight_image::Rgba8Image {
+    let list = find("gbuffer-list").unwrap();
+    image_of(&mut stage.prepare_with(list, settings, &params(list, sets)))
+}
+
+fn pixels_not_black(image: &afterlight_image::Rgba8Image) -> usize {
+    image.pixels.chunks_exact(4).filter(|p| p[..3] != [0, 0, 0]).count()
+}
+
+/// The weights of every pixel sum to the samples, on intersecting triangles as well.
+#[test]
+fn weights_sum_to_the_samples() {
+    let gpu = afterlight_testkit::gpu();
+    for source in ["builtin:intersect", "builtin:colonnade?triangles=30000&texture=64", "builtin:edge", "builtin:spheres"] {
+        let stage = Stage::new(&gpu, source);
+        for samples in counts(&gpu) {
+            let settings =
+                Settings { samples, view: "weights".to_owned(), ..stage.settings((161, 91), 2) };
+            for (technique, params, name) in variants() {
+                if !technique.info().views.contains(&"weights") {
+                    continue;
+                }
+                let off = pixels_not_black(&image_of(&mut stage.prepare_with(technique, &settings, &params)));
+                println!("{source}, {samples} samples: {name}: {off} pixels");
+                assert_eq!(off, 0, "{source}, {samples} samples: {name}: pixels whose weights are off");
+            }
+        }
+    }
+}
+
+/// Lists with room for all equal what holds every sample, whatever the layout of their blocks.
+#[test]
+fn lists_equal_the_deduplicated_samples() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=30000");
+    for samples in counts(&gpu) {
+        let settings = Settings { samples, ..stage.settings((320, 180), 100) };
+        let dedup = stage.image(find("deferred-dedup").unwrap(), &settings);
+        for sets in [
+            &[("fill", "compute")][..],
+            &[("fill", "compute"), ("pointer", "wide")],
+            &[("fill", "compute"), ("position", "depth")],
+            &[("fill", "raster"), ("position", "distance")],
+            &[("fill", "raster"), ("pointer", "wide")],
+            &[("fill", "raster")],
+        ] {
+            let db = psnr(&dedup, &list_image(&stage, &settings, sets));
+            println!("{samples} samples: {sets:?}: {db:.2} dB to deferred-dedup");
+            let least_db = if sets.contains(&("position", "depth")) || sets.len() == 1 && sets[0].1 == "raster" { 40.0 } else { 45.0 };
+            assert!(db >= least_db, "{samples} samples: {sets:?}: {db:.2} dB to deferred-dedup");
+        }
+    }
+}
+
+/// With blocks for one sample alone the image is that of one sample, and what was dropped is told.
+#[test]
+fn without_dynamic_blocks_it_is_the_image_of_one_sample() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=30000");
+    let one = stage.image(find("visibility").unwrap(), &stage.settings((320, 180), 100));
+    let list = find("gbuffer-list").unwrap();
+    for samples in counts(&gpu) {
+        let settings = Settings { samples, ..stage.settings((320, 180), 100) };
+        for (sets, least_db) in [(&[("blocks", "0")][..], 30.0)] {
+            let mut prepared = stage.prepare_with(list, &settings, &params(list, sets));
+            let db = psnr(&one, &image_of(&mut prepared));
+            let counters = prepared.counters().unwrap_or_else(|e| panic!("{e}"));
+            println!("{samples} samples: {sets:?}: {db:.2} dB to one sample, {counters:?}");
+            assert!(counters[0].dropped > 0 && counters[0].capacity == 0, "{counters:?}");
+            assert!(db >= least_db, "{samples} samples: {sets:?}: {db:.2} dB to one sample");
+        }
     }
 }

@@ -155,7 +155,9 @@ pub fn shade(
 ) -> Result<ImageHandle, TechniqueError> {
     let tiled = lights == "tiled";
     let tag = if tiled { format!("{source}-tiled") } else { source.to_owned() };
-    let shader = frame.shader(&emission_variant(frame, &format!("multisample/shade.comp#{tag}")))?;
+    let name = format!("multisample/shade.comp#{tag}");
+    // Lists hold emission in their blocks.
+    let shader = frame.shader(&if source == "list" { name } else { emission_variant(frame, &name) })?;
     let radiance =
         graph.image(&format!("{technique}/radiance"), frame.image_info(vk::Format::R16G16B16A16_SFLOAT));
     let mut pass = frame.compute(graph, &format!("{technique}/shade"), &shader);

@@ -36,5 +36,10 @@ vec3 resolved(vec3 weighted_radiance) {
     if (VIEW == 4u) {
         return vec3(weight_sum + source_background == SAMPLES ? 0.0 : 1.0, 0.0, 0.0);
     }
-    return (weighted_radiance + float(source_background) * frame.background_radiance) / float(SAMPLES);
+    if (weight_sum == 0u) {
+        return frame.background_radiance;
+    }
+    // Samples that a list dropped take the colour of the others; else the factor is exactly 1.
+    float of_surfaces = float(SAMPLES - source_background) / float(weight_sum);
+    return (weighted_radiance * of_surfaces + float(source_background) * frame.background_radiance) / float(SAMPLES);
 }
