@@ -178,7 +178,8 @@ impl Renderer {
 
         let mut capacities = Capacities::default();
         loop {
-            let mut prepared = self.record(technique, params, &view, &draws, &constants, &capacities, &also)?;
+            let mut prepared =
+                self.record(technique, params, &view, &draws, &constants, &capacities, &also)?;
             if !capacities.is_watched() {
                 return Ok(prepared);
             }
@@ -214,7 +215,10 @@ impl Renderer {
             return Err(TechniqueError::UnknownView {
                 technique: info.id,
                 found: view.clone(),
-                known: std::iter::once(view::FINAL).chain(info.views.iter().copied()).collect::<Vec<_>>().join(", "),
+                known: std::iter::once(view::FINAL)
+                    .chain(info.views.iter().copied())
+                    .collect::<Vec<_>>()
+                    .join(", "),
             });
         }
         Ok(())
