@@ -22,6 +22,7 @@ pub use afterlight_scene as scene;
 pub use afterlight_shader as shader;
 
 mod capacity;
+pub mod compute_raster;
 pub mod cost;
 mod draw_list;
 mod error;
