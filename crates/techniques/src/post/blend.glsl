@@ -1,11 +1,11 @@
-// Mixing colours of the image that is shown: in linear light, since coverage is a share of light.
+// What filters share: radiance that was mixed, as it is shown.
 #ifndef AFTERLIGHT_POST_BLEND
 #define AFTERLIGHT_POST_BLEND
 #include "tonemap.glsl"
 
-// Inverse of srgb_from_linear (IEC 61966-2-1).
-vec3 linear_from_srgb(vec3 c) {
-    return mix(pow((c + 0.055) / 1.055, vec3(2.4)), c / 12.92, lessThanEqual(c, vec3(0.04045)));
+// As present/tonemap.comp.glsl.
+vec3 display_color(vec3 radiance) {
+    return srgb_from_linear(clamp(pbr_neutral(radiance), 0.0, 1.0));
 }
 
 #endif

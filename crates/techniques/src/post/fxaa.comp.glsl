@@ -14,14 +14,15 @@
 
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(set = 0, binding = 8) uniform sampler2D color;
+layout(set = 0, binding = 10) uniform texture2D hdr;
 layout(set = 0, binding = 9, rgba8) writeonly uniform image2D final_color;
 
 // Least contrast of a neighbourhood, as a share of its brightest luma: lower finds more edges and costs more.
-const float CONTRAST_RELATIVE = 0.125;
+const float CONTRAST_RELATIVE = 0.25;
 // Least contrast in any case: what is darker shows no staircase.
 const float CONTRAST_ABSOLUTE = 0.0312;
 // Most that a detail smaller than a pixel shifts it, as a share of a pixel: 1 is softest, 0 leaves such details.
-const float SUBPIXEL = 0.0;
+const float SUBPIXEL = 0.25;
 // Steps of the walk along the edge, pixels; they grow, since far ends matter less. Sum: 29.5.
 const int STEP_COUNT = 12;
 const float STEPS_PX[STEP_COUNT] = float[](1.0, 1.0, 1.0, 1.0, 1.0, 1.5, 2.0, 2.0, 2.0, 2.0, 4.0, 8.0);
@@ -99,7 +100,7 @@ void main() {
     float edge_shift_px = turns_away ? 0.5 - nearer_px / (distance_before_px + distance_after_px) : 0.0;
 
     ivec2 neighbour = clamp(ivec2(pixel) + ivec2(across), ivec2(0), ivec2(frame.size_px) - 1);
-    vec3 linear = mix(linear_from_srgb(rgba.rgb), linear_from_srgb(texelFetch(color, neighbour, 0).rgb),
-                      max(edge_shift_px, detail_shift_px));
-    imageStore(final_color, ivec2(pixel), vec4(srgb_from_linear(linear), rgba.a));
+    vec3 radiance = mix(texelFetch(hdr, ivec2(pixel), 0).rgb, texelFetch(hdr, neighbour, 0).rgb,
+                        max(edge_shift_px, detail_shift_px));
+    imageStore(final_color, ivec2(pixel), vec4(display_color(radiance), rgba.a));
 }
