@@ -88,9 +88,8 @@ mod tests {
     #[test]
     fn squares_are_averaged_before_the_tone_map() {
         // Two squares of 2x2: one half lit, one uniform.
-        let pixel = |value: f32| {
-            [value, value, value, 1.0].into_iter().flat_map(|c| f16::from_f32(c).to_le_bytes())
-        };
+        let pixel =
+            |value: f32| [value, value, value, 1.0].into_iter().flat_map(|c| f16::from_f32(c).to_le_bytes());
         let bytes: Vec<u8> =
             [1.0, 0.0, 0.25, 0.25, 1.0, 0.0, 0.25, 0.25].into_iter().flat_map(pixel).collect();
         let [half, _, _] = present::display_rgb8([0.5; 3]);

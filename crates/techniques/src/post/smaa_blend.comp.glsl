@@ -3,6 +3,7 @@
 // The four shares are those of its upper and left edges, and those of the upper edge of the pixel below and the left edge of
 // the pixel to the right. Only the axis with the greatest share counts, since the two describe one line at corners.
 // In: color, RGBA8, sRGB-encoded; hdr, RGBA16F, radiance; weights, RGBA8. Out: final_color, RGBA8, sRGB-encoded.
+// Variant SWAP_SHARES exchanges what a pixel takes and what it gives: a mutant that a test must catch.
 // One thread a pixel, groups of 8x8.
 #version 460
 #extension GL_GOOGLE_include_directive : require
@@ -15,15 +16,16 @@ layout(set = 0, binding = 9) uniform texture2D hdr;
 layout(set = 0, binding = 10) uniform texture2D weights;
 layout(set = 0, binding = 11, rgba8) writeonly uniform image2D final_color;
 
-// Exchanges what a pixel takes and what it gives: a mutant for the tests.
-layout(constant_id = 8) const uint SWAP_SHARES = 0u;
-
 vec4 weights_at(ivec2 pixel) {
     if (any(greaterThanEqual(pixel, ivec2(frame.size_px)))) {
         return vec4(0.0);
     }
     vec4 share = texelFetch(weights, pixel, 0);
-    return SWAP_SHARES != 0u ? share.grab : share;
+#ifdef SWAP_SHARES
+    return share.grab;
+#else
+    return share;
+#endif
 }
 
 void main() {

@@ -11,7 +11,7 @@ layout(set = 0, binding = 8) uniform texture2D color;
 layout(set = 0, binding = 9, rg8) writeonly uniform image2D edges;
 
 // Least difference of luma that is an edge.
-const float THRESHOLD = 0.05;
+const float THRESHOLD = 0.1;
 // An edge is dropped where a neighbouring one is more than this many times as strong.
 const float ADAPTATION = 2.0;
 
