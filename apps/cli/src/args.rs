@@ -334,12 +334,9 @@ mod tests {
 
     #[test]
     fn what_is_not_there_yet_is_refused() {
-        for option in [
-            ["--shadows", "map"],
-            ["--indirect", "rsm"],
-            ["--view", "normals"],
-            ["--shadow-map-size", "512"],
-        ] {
+        for option in
+            [["--shadows", "map"], ["--indirect", "rsm"], ["--view", "normals"], ["--shadow-map-size", "512"]]
+        {
             let failure = compare(&option).common.check().expect_err("is refused");
             let line = failure.lines().remove(0);
             assert_eq!(failure.code(), 2);
