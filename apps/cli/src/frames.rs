@@ -8,7 +8,7 @@ use afterlight_graph::gpu::{GpuError, Statistics};
 use afterlight_image::{Rgba8Image, RgbaF32Image};
 use afterlight_measure::{Buffer, CostRecord, Memory, Pass, RunResult, Spread, Status};
 use afterlight_techniques::cost::Workload;
-use afterlight_techniques::{Params, Prepared, Renderer, TechniqueError};
+use afterlight_techniques::{Counter, Params, Prepared, Renderer, TechniqueError};
 use serde_json::Value;
 
 use crate::session::{Chosen, ms_since};
@@ -40,6 +40,7 @@ pub fn measure(
             let status = match error {
                 TechniqueError::Unavailable { .. }
                 | TechniqueError::Samples { .. }
+                | TechniqueError::UnknownView { .. }
                 | TechniqueError::Gpu(
                     GpuError::UnsupportedSamples { .. } | GpuError::UnsupportedFormat { .. },
                 ) => Status::Unavailable,
@@ -81,6 +82,18 @@ fn run(
     result.memory = reports.last().map(memory);
     result.counters.insert("draws".to_owned(), prepared.draw_calls.into());
     result.counters.insert("prepare_ms".to_owned(), Value::from(prepare_ms));
+    let counters = prepared.counters()?;
+    for counter in &counters {
+        for (what, count) in
+            [("needed", counter.needed), ("capacity", counter.capacity), ("dropped", counter.dropped)]
+        {
+            result.counters.insert(format!("{}_{what}", counter.name), Value::from(count));
+        }
+    }
+    result.reason = counters.iter().find(|counter| counter.dropped > 0).map(|counter| {
+        let Counter { name, needed, capacity, dropped, .. } = counter;
+        format!("{name}: found {needed} needed, {capacity} there; {dropped} samples dropped")
+    });
     let cost = chosen.technique.predict(workload, &chosen.params);
     result.cost = Some(CostRecord { cmd: cost.cmd, proc: cost.proc, mem: cost.mem, band: cost.band });
     let (width, height) = prepared.size_px();

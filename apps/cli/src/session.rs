@@ -191,6 +191,7 @@ impl Session {
             environment: scene.environment,
             keep_hdr,
             post: common.post.into(),
+            view: common.view.clone(),
             ..Settings::for_scene(&scene, common.width, common.height)
         };
         let bar = progress.bar("textures", scene.images.len() as u64);

@@ -43,6 +43,8 @@ features! {
     sample_counts_integer: u32,
     /// Sample counts of storage images: a bit mask, bit value = count.
     sample_counts_storage: u32,
+    /// Samples stand where the specification's table of standard locations has them.
+    standard_sample_locations: bool,
     /// `VK_EXT_post_depth_coverage`.
     post_depth_coverage: bool,
     /// `VK_KHR_fragment_shader_barycentric`.
@@ -357,6 +359,7 @@ pub(crate) fn detect(instance: &ash::Instance, physical: vk::PhysicalDevice, ind
         sample_counts_stencil: limits.framebuffer_stencil_sample_counts.as_raw(),
         sample_counts_integer: p12.framebuffer_integer_color_sample_counts.as_raw(),
         sample_counts_storage: limits.storage_image_sample_counts.as_raw(),
+        standard_sample_locations: on(limits.standard_sample_locations),
         post_depth_coverage: has(ash::ext::post_depth_coverage::NAME),
         fragment_barycentric: on(enable.barycentric.fragment_shader_barycentric),
         mesh_shader: on(enable.mesh.mesh_shader),

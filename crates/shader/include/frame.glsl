@@ -46,6 +46,12 @@ float distance_from_depth(float depth) {
     return (depth * k.x + k.y) / (depth * k.z + k.w);
 }
 
+// Depth of a view distance, the inverse of distance_from_depth.
+float depth_from_distance(float distance_m) {
+    vec4 k = frame.depth_to_distance;
+    return (distance_m * k.w - k.y) / (k.x - distance_m * k.z);
+}
+
 // Unit vector from a point to the eye.
 vec3 view_direction(vec3 position_ws) {
     return normalize(frame.eye_ws.xyz - position_ws * frame.eye_ws.w);

@@ -108,6 +108,15 @@ vec3 light_radiance(ShadingPoint p, uint index) {
     return intensity * attenuation * reflectance(p, l);
 }
 
+// Radiance of every light, in order.
+vec3 all_lights_radiance(ShadingPoint p) {
+    vec3 radiance = vec3(0.0);
+    for (uint i = 0u; i < frame.light_count; ++i) {
+        radiance += light_radiance(p, i);
+    }
+    return radiance;
+}
+
 // Radiance that needs no light: emission and the constant ambient term, or the base colour of an unlit surface. A white
 // surface reflects as much as reaches it.
 vec3 unlit_radiance(Surface s) {

@@ -22,6 +22,18 @@ void emit_tile_lights(uint first) {
 void emit_tile_lights(uint first) {}
 #endif
 
+// Radiance of the lights of the batch from `first` on that touch the tile (after tile_cull).
+vec3 tile_batch_radiance(ShadingPoint p, uint first) {
+    vec3 radiance = vec3(0.0);
+    uint words = (min(frame.light_count - first, BATCH_LIGHTS) + 31u) / 32u;
+    for (uint w = 0u; w < words; ++w) {
+        for (uint bits = tile_lights[w]; bits != 0u; bits &= bits - 1u) {
+            radiance += light_radiance(p, first + w * 32u + uint(findLSB(bits)));
+        }
+    }
+    return radiance;
+}
+
 // Radiance of all lights that touch the tile. The whole group calls it; `lit` is false for pixels without a surface or
 // with an unlit one.
 vec3 tiled_radiance(ShadingPoint p, bool lit) {
@@ -31,12 +43,7 @@ vec3 tiled_radiance(ShadingPoint p, bool lit) {
         tile_cull(t, first);
         emit_tile_lights(first);
         if (lit) {
-            uint words = (min(frame.light_count - first, BATCH_LIGHTS) + 31u) / 32u;
-            for (uint w = 0u; w < words; ++w) {
-                for (uint bits = tile_lights[w]; bits != 0u; bits &= bits - 1u) {
-                    radiance += light_radiance(p, first + w * 32u + uint(findLSB(bits)));
-                }
-            }
+            radiance += tile_batch_radiance(p, first);
         }
     }
     return radiance;

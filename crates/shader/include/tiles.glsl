@@ -42,22 +42,27 @@ vec4 clip_row(int i) {
     return vec4(m[0][i], m[1][i], m[2][i], m[3][i]);
 }
 
-// Reduces the view distances of a tile's pixels. Every thread of the group calls it once; `covered` is false where the
-// pixel shows no surface. False where no pixel of the tile does.
-bool tile_reduce_depth(bool covered, float distance_m) {
+// Reduces the ranges of view distances of a tile's pixels. Every thread of the group calls it once; `covered` is false
+// where the pixel shows no surface. False where no pixel of the tile does.
+bool tile_reduce_range(bool covered, float nearest_m, float farthest_m) {
     if (gl_LocalInvocationIndex == 0u) {
         tile_nearest = 0x7f7fffffu;
         tile_farthest = 0u;
     }
     barrier();
-    float nearest = subgroupMin(covered ? distance_m : 3.402823e38);
-    float farthest = subgroupMax(covered ? distance_m : 0.0);
+    float nearest = subgroupMin(covered ? nearest_m : 3.402823e38);
+    float farthest = subgroupMax(covered ? farthest_m : 0.0);
     if (subgroupElect() && nearest < 3.402823e38) {
         atomicMin(tile_nearest, floatBitsToUint(nearest));
         atomicMax(tile_farthest, floatBitsToUint(farthest));
     }
     barrier();
     return tile_nearest <= tile_farthest;
+}
+
+// The same for pixels of one sample.
+bool tile_reduce_depth(bool covered, float distance_m) {
+    return tile_reduce_range(covered, distance_m, distance_m);
 }
 
 struct TileFrustum {

@@ -27,4 +27,10 @@ vec3 srgb_from_linear(vec3 c) {
     return mix(high, low, lessThanEqual(c, vec3(0.0031308)));
 }
 
+vec3 linear_from_srgb(vec3 c) {
+    vec3 low = c / 12.92;
+    vec3 high = pow((max(c, vec3(0.0)) + 0.055) / 1.055, vec3(2.4));
+    return mix(high, low, lessThanEqual(c, vec3(0.04045)));
+}
+
 #endif

@@ -69,11 +69,31 @@ vec2 load_uv(uint first, uint offset) {
     return uintBitsToFloat(uvec2(attributes[first + offset], attributes[first + offset + 1u]));
 }
 
+// Vertices of a triangle, and its draw.
+uvec3 triangle_vertices(uint id, DrawData d) {
+    uint first = d.first_index + (id & ((1u << TRIANGLE_BITS) - 1u)) * 3u;
+    return d.first_vertex + uvec3(indices[first], indices[first + 1u], indices[first + 2u]);
+}
+
+// Whether a triangle covers a point of the screen, and its depth there.
+bool triangle_at(uint id, vec2 ndc, out float depth) {
+    DrawData d = load_draw(draw_data, id >> TRIANGLE_BITS);
+    uvec3 v = triangle_vertices(id, d);
+    vec4 p0 = frame.clip_from_world * vec4(load_position(d, v.x), 1.0);
+    vec4 p1 = frame.clip_from_world * vec4(load_position(d, v.y), 1.0);
+    vec4 p2 = frame.clip_from_world * vec4(load_position(d, v.z), 1.0);
+    vec2 q0 = p0.xy - ndc * p0.w, q1 = p1.xy - ndc * p1.w, q2 = p2.xy - ndc * p2.w;
+    vec3 b = vec3(cross2(q1, q2), cross2(q2, q0), cross2(q0, q1));
+    b /= b.x + b.y + b.z;
+    float w = b.x * p0.w + b.y * p1.w + b.z * p2.w;
+    depth = (b.x * p0.z + b.y * p1.z + b.z * p2.z) / w;
+    return all(greaterThanEqual(b, vec3(0.0))) && w > 0.0;
+}
+
 SurfacePoint triangle_point(uint id, vec2 ndc, out uint material) {
     DrawData d = load_draw(draw_data, id >> TRIANGLE_BITS);
     material = d.material;
-    uint first = d.first_index + (id & ((1u << TRIANGLE_BITS) - 1u)) * 3u;
-    uvec3 v = d.first_vertex + uvec3(indices[first], indices[first + 1u], indices[first + 2u]);
+    uvec3 v = triangle_vertices(id, d);
     vec3 p0 = load_position(d, v.x), p1 = load_position(d, v.y), p2 = load_position(d, v.z);
     Barycentrics b = barycentrics_at(ndc, clip_xyw(p0), clip_xyw(p1), clip_xyw(p2));
 

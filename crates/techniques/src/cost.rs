@@ -43,8 +43,10 @@ pub struct Workload {
     pub tiles: f64,
     /// t in lf/t: pixels that share one list of lights.
     pub pixels_a_tile: f64,
-    /// sspp: shading samples a pixel.
+    /// sspp: most shading samples a pixel; vspp, visibility samples, as well.
     pub shading_samples: f64,
+    /// sspe: shading samples that a pixel is expected to need: the surfaces that show in it.
+    pub expected_samples: f64,
     /// memll: floats of light lists.
     pub light_list_floats: f64,
     /// lcp: share of light-pixel pairs that culling removes.
@@ -78,6 +80,7 @@ impl Default for Workload {
             tiles: 0.0,
             pixels_a_tile: 256.0,
             shading_samples: 1.0,
+            expected_samples: 1.0,
             light_list_floats: 0.0,
             light_culling: 0.0,
             sort: 0.0,
@@ -143,6 +146,52 @@ pub fn deferred(w: &Workload) -> Cost {
         band: (w.vertex_traffic() + w.object_fragments * (w.object_fragment_traffic + 3.0))
             + (w.volume_traffic() + w.light_fragments * (w.light_fragment_traffic + 3.0))
             + 3.0 * w.pixels,
+    }
+}
+
+/// DAA, section 4.4.
+pub fn deferred_msaa(w: &Workload) -> Cost {
+    let s = w.shading_samples;
+    Cost {
+        cmd: w.objects * w.object_command + w.lights * w.light_command,
+        proc: w.vertices() + (w.light_volumes() + w.light_fragments * s * w.evaluation),
+        mem: 4.0 * w.pixels * s,
+        band: (w.vertex_traffic() + w.object_fragments * (w.object_fragment_traffic + 3.0) * s)
+            + (w.volume_traffic() + w.light_fragments * s * (w.light_fragment_traffic + 3.0))
+            + 3.0 * w.pixels * s,
+    }
+}
+
+/// The project's own: DAA with five floats a sample (Schied and Dachsbacher 2015, section 5), of which each is read once and
+/// only those of different triangles are shaded. No light volumes.
+pub fn deferred_dedup(w: &Workload) -> Cost {
+    let (stored, shaded) = (w.shading_samples, w.expected_samples);
+    Cost {
+        cmd: w.objects * w.object_command,
+        proc: w.vertices() + w.light_fragments * shaded * w.evaluation,
+        mem: 5.0 * w.pixels * stored,
+        band: (w.vertex_traffic() + w.object_fragments * (w.object_fragment_traffic + 5.0 * stored))
+            + w.light_fragments * shaded * w.light_fragment_traffic
+            + 5.0 * w.pixels * stored,
+    }
+}
+
+/// The project's own: per-pixel lists (Fridvalszky and Tóth 2020). Depth (and triangle IDs, where compute fills the lists) at
+/// all samples, blocks of 3.5 floats for what shows alone.
+pub fn gbuffer_list(w: &Workload, fill_in_compute: bool) -> Cost {
+    let (stored, shaded) = (w.shading_samples, w.expected_samples);
+    let floats_a_sample = if fill_in_compute { 2.0 } else { 1.0 };
+    let blocks = 3.5 * w.pixels * shaded;
+    let passes = if fill_in_compute { 1.0 } else { 2.0 };
+    Cost {
+        cmd: passes * w.objects * w.object_command,
+        proc: passes * w.vertices() + w.light_fragments * shaded * w.evaluation,
+        mem: floats_a_sample * w.pixels * stored + blocks,
+        band: passes * w.vertex_traffic()
+            + w.object_fragments * floats_a_sample * stored
+            + w.pixels * (floats_a_sample * stored + shaded * w.object_fragment_traffic)
+            + 2.0 * blocks
+            + w.light_fragments * shaded * w.light_fragment_traffic,
     }
 }
 
@@ -214,6 +263,29 @@ mod tests {
         assert_eq!(
             tiled_deferred(&w),
             Cost { cmd: 13.0, proc: 144.0, mem: 120.0, band: 600.0 + 25.0 + 167.0 }
+        );
+        let four = Workload { shading_samples: 4.0, expected_samples: 1.5, ..w };
+        assert_eq!(
+            deferred_msaa(&four),
+            Cost {
+                cmd: 13.0,
+                proc: 100.0 + 24.0 + 80.0 * 1.0,
+                mem: 640.0,
+                band: 200.0 + 1600.0 + 24.0 + 800.0 + 480.0
+            }
+        );
+        assert_eq!(
+            deferred_dedup(&four),
+            Cost { cmd: 10.0, proc: 130.0, mem: 800.0, band: 200.0 + 50.0 * 25.0 + 210.0 + 800.0 }
+        );
+        assert_eq!(
+            gbuffer_list(&four, true),
+            Cost {
+                cmd: 10.0,
+                proc: 130.0,
+                mem: 320.0 + 210.0,
+                band: 200.0 + 400.0 + 40.0 * 15.5 + 420.0 + 210.0
+            }
         );
         assert_eq!(
             visibility_buffer(&w),

@@ -61,6 +61,26 @@ pub enum TechniqueError {
         /// Counts that it can render here.
         expected: String,
     },
+    /// A debug view that the technique does not have.
+    #[error("view {found:?} of {technique}: found no such view, expected one of: {known}")]
+    UnknownView {
+        /// The technique.
+        technique: &'static str,
+        /// The view.
+        found: String,
+        /// Views that it has.
+        known: String,
+    },
+    /// Parameters that do not go together.
+    #[error("{technique}: found {found}, expected {expected}")]
+    Conflict {
+        /// The technique.
+        technique: &'static str,
+        /// What was asked for.
+        found: String,
+        /// What would do.
+        expected: String,
+    },
     /// The device lacks features.
     #[error("{technique}: the device lacks {missing}")]
     Unavailable {

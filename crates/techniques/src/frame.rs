@@ -1,9 +1,15 @@
 //! What a technique is given to record a frame.
 
-use afterlight_graph::{BufferHandle, Graph, ImageHandle, ImageInfo, gpu::vk};
+use afterlight_graph::{
+    BufferHandle, Graph, ImageHandle, ImageInfo,
+    gpu::{self, vk},
+};
 use afterlight_shader::Shader;
 
-use crate::{SHADERS, error::TechniqueError, light_list::LightList, params::Params, scene_gpu::SceneGpu};
+use crate::{
+    SHADERS, capacity::Capacities, error::TechniqueError, light_list::LightList, params::Params,
+    scene_gpu::SceneGpu,
+};
 
 /// A frame to be recorded: the scene on the device, its buffers imported into the graph, sizes and parameters.
 pub struct Frame<'a> {
@@ -19,12 +25,16 @@ pub struct Frame<'a> {
     pub scene: &'a SceneGpu,
     /// The lights.
     pub lights: &'a LightList,
+    /// What to show: [`crate::view::FINAL`] or one of the technique's views.
+    pub view: &'a str,
     /// World to clip. A technique that uses it while recording is recorded again when the camera moves.
     pub clip_from_world: glam::Mat4,
     /// Radiance of pixels without a surface.
     pub background_radiance: [f32; 3],
     pub(crate) buffers: FrameBuffers,
     pub(crate) extra_shaders: &'a [Shader],
+    pub(crate) device: &'a gpu::Device,
+    pub(crate) capacities: &'a Capacities,
 }
 
 /// Buffers of the scene and the frame as the graph knows them.
@@ -52,7 +62,7 @@ pub trait Slots {
     /// Binds an image that shaders read.
     fn read_image(&mut self, slot: &str, image: &ImageHandle);
     /// Binds the scene's textures.
-    fn textures(&mut self, set: &afterlight_graph::gpu::DescriptorSet);
+    fn textures(&mut self, set: &gpu::DescriptorSet);
 }
 
 macro_rules! slots {
@@ -64,7 +74,7 @@ macro_rules! slots {
             fn read_image(&mut self, slot: &str, image: &ImageHandle) {
                 self.read(slot, image);
             }
-            fn textures(&mut self, set: &afterlight_graph::gpu::DescriptorSet) {
+            fn textures(&mut self, set: &gpu::DescriptorSet) {
                 self.texture_set(set);
             }
         }
@@ -90,6 +100,56 @@ impl Frame<'_> {
     /// Describes an image as large as the frame, one sample.
     pub fn image_info(&self, format: vk::Format) -> ImageInfo {
         ImageInfo::new(format, self.width_px, self.height_px)
+    }
+
+    /// Describes an image as large as the frame, the frame's samples a pixel.
+    pub fn multisampled_info(&self, format: vk::Format) -> ImageInfo {
+        self.image_info(format).samples(self.samples)
+    }
+
+    /// Whether a debug view is to be shown.
+    pub fn shows(&self, view: &str) -> bool {
+        self.view == view
+    }
+
+    /// Brings a small table that a technique made on the CPU into the graph, as a storage buffer.
+    ///
+    /// # Errors
+    /// The device.
+    pub fn table(
+        &self,
+        graph: &mut Graph,
+        name: &str,
+        words: &[u32],
+    ) -> Result<BufferHandle, TechniqueError> {
+        let words = if words.is_empty() { &[0] } else { words };
+        let buffer = self.device.create_buffer(&gpu::BufferDesc {
+            name,
+            bytes: size_of_val(words) as u64,
+            usage: vk::BufferUsageFlags::STORAGE_BUFFER,
+            memory: gpu::MemoryKind::Upload,
+        })?;
+        buffer.write(0, bytemuck::cast_slice(words))?;
+        Ok(graph.import_buffer(name, &buffer))
+    }
+
+    /// The device's format for depth with stencil.
+    pub fn depth_stencil_format(&self) -> vk::Format {
+        self.device.depth_stencil_format()
+    }
+
+    /// Depth with stencil in four bytes a sample where the device has it, else [`Self::depth_stencil_format`].
+    pub fn small_depth_stencil_format(&self) -> vk::Format {
+        let wanted = vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT | vk::FormatFeatureFlags::SAMPLED_IMAGE;
+        match self.device.format_supports(vk::Format::D24_UNORM_S8_UINT, wanted) {
+            true => vk::Format::D24_UNORM_S8_UINT,
+            false => self.depth_stencil_format(),
+        }
+    }
+
+    /// What the device can do.
+    pub fn features(&self) -> &gpu::Features {
+        self.device.features()
     }
 
     /// Binds what every pass over the scene may read, by the names of `include/*.glsl`: frame constants, draws, materials,

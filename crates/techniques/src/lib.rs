@@ -21,6 +21,7 @@ pub use afterlight_graph as graph;
 pub use afterlight_scene as scene;
 pub use afterlight_shader as shader;
 
+mod capacity;
 pub mod cost;
 mod draw_list;
 mod error;
@@ -28,14 +29,17 @@ mod frame;
 pub mod gbuffer;
 pub mod geometry;
 mod light_list;
+pub mod multisample;
 mod params;
 pub mod post;
 pub mod present;
+mod radiance_target;
 mod renderer;
 mod scene_gpu;
 pub mod supersample;
 mod technique;
 mod textures;
+pub mod view;
 pub mod volumes;
 
 pub use draw_list::{DrawOptions, DrawOrder};
@@ -44,9 +48,12 @@ pub use frame::Frame;
 pub use light_list::LightList;
 pub use params::{ParamInfo, ParamKind, Params};
 pub use post::Post;
+pub use capacity::Counter;
 pub use renderer::{Prepared, Renderer, Settings};
 pub use scene_gpu::SceneGpu;
-pub use technique::{Answers, AppendixA, Exactness, Info, Need, Source, Technique};
+pub use technique::{
+    ANY_SAMPLES, Answers, AppendixA, Exactness, Info, MULTIPLE_SAMPLES, Need, Source, Technique,
+};
 
 include!(concat!(env!("OUT_DIR"), "/registry.rs"));
 include!(concat!(env!("OUT_DIR"), "/shaders.rs"));

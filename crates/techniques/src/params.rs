@@ -22,6 +22,27 @@ pub enum ParamKind {
         /// Greatest value.
         max: u32,
     },
+    /// `auto`, or a whole number in a range.
+    AutoOrInteger {
+        /// Least value.
+        min: u32,
+        /// Greatest value.
+        max: u32,
+    },
+    /// A number in a range.
+    Number {
+        /// Least value.
+        min: f32,
+        /// Greatest value.
+        max: f32,
+    },
+    /// `none`, or some words joined by `+`.
+    Words {
+        /// The words.
+        values: &'static [&'static str],
+    },
+    /// Any text.
+    Text,
 }
 
 /// A parameter of a technique.
@@ -62,6 +83,19 @@ impl ParamKind {
                 value.parse::<u32>().is_ok_and(|v| (*min..=*max).contains(&v)),
                 format!("a whole number from {min} to {max}"),
             ),
+            Self::AutoOrInteger { min, max } => (
+                value == "auto" || value.parse::<u32>().is_ok_and(|v| (*min..=*max).contains(&v)),
+                format!("auto, or a whole number from {min} to {max}"),
+            ),
+            Self::Number { min, max } => (
+                value.parse::<f32>().is_ok_and(|v| (*min..=*max).contains(&v)),
+                format!("a number from {min} to {max}"),
+            ),
+            Self::Words { values } => (
+                value == "none" || value.split('+').all(|word| values.contains(&word)),
+                format!("none, or some of: {}, joined by +", values.join(", ")),
+            ),
+            Self::Text => (true, String::new()),
         };
         if ok {
             return Ok(());
@@ -106,6 +140,11 @@ impl Params {
     /// The value of a parameter.
     pub fn get<'a>(&'a self, param: &'a ParamInfo) -> &'a str {
         self.values.get(param.key).map_or(param.default, String::as_str)
+    }
+
+    /// The value of a parameter that is a number; 0 where it is a word.
+    pub fn number(&self, info: &crate::Info, key: &str) -> f32 {
+        self.text(info, key).parse().unwrap_or_default()
     }
 
     /// The value of the parameter of that name, or `""` where the technique has none.

@@ -11,6 +11,7 @@ use afterlight_shader::{Shader, structs::FrameConstants};
 use glam::{Mat4, Vec3, Vec4};
 
 use crate::{
+    capacity::{Capacities, Counter, Demand},
     draw_list::{DrawList, DrawOptions, DrawOrder},
     error::TechniqueError,
     frame::{Frame, FrameBuffers},
@@ -19,7 +20,7 @@ use crate::{
     post::{self, Post},
     scene_gpu::{SceneGpu, upload_slice},
     technique::Technique,
-    volumes,
+    view, volumes,
 };
 
 /// Layout in which uploads leave images.
@@ -40,6 +41,8 @@ pub struct Settings {
     pub lights: Vec<Light>,
     /// What surrounds the scene.
     pub environment: Environment,
+    /// What to show: [`view::FINAL`] or a debug view of the technique.
+    pub view: String,
     /// Keeps the linear radiance after a frame, for [`Prepared::hdr_rgba`]; its memory is then not reused.
     pub keep_hdr: bool,
     /// Anti-aliasing after shading.
@@ -57,6 +60,7 @@ impl Settings {
             camera: camera.unwrap_or_else(|| Camera::look_at("default", Vec3::Z, Vec3::ZERO, 1.0, 0.1)),
             lights: scene.lights.clone(),
             environment: scene.environment,
+            view: view::FINAL.to_owned(),
             keep_hdr: false,
             post: Post::None,
         }
@@ -151,20 +155,10 @@ impl Renderer {
         &self,
         technique: &dyn Technique,
         params: &Params,
-        also: impl FnOnce(&mut Graph, &ImageHandle),
+        also: impl Fn(&mut Graph, &ImageHandle),
     ) -> Result<Prepared, TechniqueError> {
         let info = technique.info();
-        let missing = technique.missing(self.device.features());
-        if !missing.is_empty() {
-            return Err(TechniqueError::Unavailable { technique: info.id, missing: missing.join(", ") });
-        }
-        if !info.samples.contains(&self.settings.samples) {
-            return Err(TechniqueError::Samples {
-                technique: info.id,
-                found: self.settings.samples,
-                expected: info.samples.iter().map(u32::to_string).collect::<Vec<_>>().join(", "),
-            });
-        }
+        self.check(technique)?;
         let options = DrawOptions {
             cull: params.text(info, "cull") == "frustum",
             order: match params.text(info, "order") {
@@ -185,6 +179,67 @@ impl Renderer {
         })?;
         constants.write(0, bytemuck::bytes_of(&view.constants(settings, &self.lights)))?;
 
+        let mut capacities = Capacities::default();
+        loop {
+            let mut prepared =
+                self.record(technique, params, &view, &draws, &constants, &capacities, &also)?;
+            if !capacities.is_watched() {
+                return Ok(prepared);
+            }
+            // What the view needs is known after a frame of it.
+            prepared.run()?;
+            match capacities.next(&prepared.counters()?) {
+                Some(next) => capacities = next,
+                None => return Ok(prepared),
+            }
+        }
+    }
+
+    fn check(&self, technique: &dyn Technique) -> Result<(), TechniqueError> {
+        let info = technique.info();
+        let features = self.device.features();
+        let missing = technique.missing(features);
+        if !missing.is_empty() {
+            return Err(TechniqueError::Unavailable { technique: info.id, missing: missing.join(", ") });
+        }
+        let samples = self.settings.samples;
+        let there = |count: u32| count == 1 || features.supports_samples(count, false);
+        if !info.samples.contains(&samples) || !there(samples) {
+            let known: Vec<String> =
+                info.samples.iter().filter(|count| there(**count)).map(u32::to_string).collect();
+            return Err(TechniqueError::Samples {
+                technique: info.id,
+                found: samples,
+                expected: known.join(", "),
+            });
+        }
+        let view = &self.settings.view;
+        if view != view::FINAL && !info.views.contains(&view.as_str()) {
+            return Err(TechniqueError::UnknownView {
+                technique: info.id,
+                found: view.clone(),
+                known: std::iter::once(view::FINAL)
+                    .chain(info.views.iter().copied())
+                    .collect::<Vec<_>>()
+                    .join(", "),
+            });
+        }
+        Ok(())
+    }
+
+    /// Records a frame with capacities for what can overflow.
+    #[expect(clippy::too_many_arguments, reason = "the parts of one frame")]
+    fn record(
+        &self,
+        technique: &dyn Technique,
+        params: &Params,
+        view: &View,
+        draws: &DrawList,
+        constants: &gpu::Buffer,
+        capacities: &Capacities,
+        also: &impl Fn(&mut Graph, &ImageHandle),
+    ) -> Result<Prepared, TechniqueError> {
+        let settings = &self.settings;
         let mut graph = Graph::new();
         let frame = Frame {
             width_px: settings.width_px,
@@ -195,8 +250,11 @@ impl Renderer {
             lights: &self.lights,
             clip_from_world: view.clip_from_world,
             background_radiance: settings.environment.background_radiance.into(),
-            buffers: self.import(&mut graph, &constants, &draws),
+            view: &settings.view,
+            buffers: self.import(&mut graph, constants, draws),
             extra_shaders: &self.extra_shaders,
+            device: &self.device,
+            capacities,
         };
         let hdr = technique.record(&mut graph, &frame)?;
         also(&mut graph, &hdr);
@@ -207,6 +265,7 @@ impl Renderer {
         let executor = Executor::new(&self.device, plan)?;
         Ok(Prepared {
             executor,
+            demands: capacities.demands(),
             hdr: hdr_id,
             final_color: final_id,
             draw_calls: draws.visible.iter().map(|b| b.len() as u32).sum(),
@@ -251,6 +310,7 @@ fn check_size(device: &gpu::Device, settings: &Settings) -> Result<(), Technique
 /// A technique ready to run, as often as wanted.
 pub struct Prepared {
     executor: Executor,
+    demands: Vec<Demand>,
     hdr: Option<ResourceId>,
     final_color: ResourceId,
     /// Draws in view.
@@ -289,6 +349,14 @@ impl Prepared {
     /// The last frame's linear radiance as it lies on the device, RGBA16F.
     pub(crate) fn hdr_bytes(&mut self) -> Result<Option<Vec<u8>>, TechniqueError> {
         Ok(self.hdr.map(|hdr| self.executor.read_image(hdr)).transpose()?)
+    }
+
+    /// What the last frame counted of everything that can overflow: what it needed, what there was, what was dropped.
+    ///
+    /// # Errors
+    /// The device.
+    pub fn counters(&mut self) -> Result<Vec<Counter>, TechniqueError> {
+        self.demands.iter().map(|demand| demand.read(&self.executor)).collect()
     }
 
     /// Width and height in pixels.

@@ -64,6 +64,10 @@ pub struct SceneGpu {
     pub(crate) texture_set: gpu::DescriptorSet,
     /// Specialization constants that fit the scene, by name.
     pub(crate) constants: Vec<(&'static str, u32)>,
+    /// Whether a surface that is not unlit emits light.
+    pub(crate) has_emission: bool,
+    /// Name of the node, and of the material, of each draw.
+    pub(crate) draw_names: Vec<[Arc<str>; 2]>,
     pub(crate) draw_infos: Vec<DrawInfo>,
     /// First draw of each bucket; one more entry for the end.
     pub(crate) bucket_first: [u32; BUCKETS + 1],
@@ -122,6 +126,8 @@ impl SceneGpu {
         Ok(Arc::new(Self {
             bytes: buffers.iter().map(|b| b.allocated_bytes()).sum::<u64>() + images,
             texture_set: textures.set,
+            has_emission: scene.materials.iter().any(|m| !m.unlit && m.emissive_factor != [0.0; 3]),
+            draw_names: draws.names,
             constants,
             triangle_count: draws.infos.iter().map(|d| u64::from(d.index_count / 3)).sum(),
             vertex_count: scene.positions_os.len() as u64,
@@ -205,12 +211,13 @@ pub(crate) fn record_image<T: bytemuck::NoUninit>(
 struct DrawTable {
     data: Vec<DrawData>,
     infos: Vec<DrawInfo>,
+    names: Vec<[Arc<str>; 2]>,
     bucket_first: [u32; BUCKETS + 1],
 }
 
 impl DrawTable {
     fn new(scene: &Scene, pieces: &[Vec<Aabb>], warnings: &mut Vec<String>) -> Result<Self, TechniqueError> {
-        let mut by_bucket: [Vec<(DrawData, DrawInfo)>; BUCKETS] = Default::default();
+        let mut by_bucket: [Vec<(DrawData, DrawInfo, [Arc<str>; 2])>; BUCKETS] = Default::default();
         let mut blended = 0u64;
         for instance in &scene.instances {
             let mesh = &scene.meshes[instance.mesh as usize];
@@ -224,6 +231,8 @@ impl DrawTable {
             let masked = matches!(material.alpha_mode, AlphaMode::Mask { .. });
             let bucket =
                 4 * usize::from(masked) + 2 * usize::from(material.double_sided) + usize::from(mirrored);
+            let node = scene.nodes.get(instance.node as usize).map_or("", |node| node.name.as_str());
+            let names: [Arc<str>; 2] = [node.into(), material.name.as_str().into()];
             let rows = [0, 1, 2].map(|i| {
                 let row = m.matrix3.row(i);
                 [row.x, row.y, row.z, m.translation[i]]
@@ -247,6 +256,7 @@ impl DrawTable {
                         first_index,
                         first_vertex: mesh.first_vertex,
                     },
+                    names.clone(),
                 ));
             }
         }
@@ -255,11 +265,13 @@ impl DrawTable {
                 "{blended} draws with alpha blending are left out: no opaque technique shows them"
             ));
         }
-        let mut table = Self { data: Vec::new(), infos: Vec::new(), bucket_first: [0; BUCKETS + 1] };
+        let mut table =
+            Self { data: Vec::new(), infos: Vec::new(), names: Vec::new(), bucket_first: [0; BUCKETS + 1] };
         for (bucket, draws) in by_bucket.into_iter().enumerate() {
-            for (data, info) in draws {
+            for (data, info, names) in draws {
                 table.data.push(data);
                 table.infos.push(info);
+                table.names.push(names);
             }
             table.bucket_first[bucket + 1] = table.data.len() as u32;
         }

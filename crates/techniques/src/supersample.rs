@@ -13,6 +13,7 @@ use crate::{
     renderer::{Renderer, Settings},
     scene_gpu::SceneGpu,
     technique::Technique,
+    view,
 };
 
 /// Renders a technique at `factor` times the settings' width and height, one sample a pixel, averages the linear radiance
@@ -32,8 +33,15 @@ pub fn reference_rgba8(
     let limit = device.features().max_image_dimension_2d;
     let width_px = scaled("width", settings.width_px, factor, limit)?;
     let height_px = scaled("height", settings.height_px, factor, limit)?;
-    let large =
-        Settings { width_px, height_px, samples: 1, keep_hdr: true, post: Post::None, ..settings.clone() };
+    let large = Settings {
+        width_px,
+        height_px,
+        samples: 1,
+        keep_hdr: true,
+        post: Post::None,
+        view: view::FINAL.to_owned(),
+        ..settings.clone()
+    };
     let renderer = Renderer::with_scene(device, Arc::clone(scene), &large)?;
     let mut prepared = renderer.prepare(technique, &Params::default())?;
     prepared.run()?;

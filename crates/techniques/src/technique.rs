@@ -98,9 +98,16 @@ pub struct Info {
     pub params: &'static [ParamInfo],
     /// What it needs beyond what the program needs.
     pub needs: &'static [Need],
-    /// Sample counts that it can render.
+    /// Sample counts that it can render where the device has them.
     pub samples: &'static [u32],
+    /// Debug views that it has besides `final`, by name.
+    pub views: &'static [&'static str],
 }
+
+/// Every sample count that a device may have.
+pub const ANY_SAMPLES: &[u32] = &[1, 2, 4, 8, 16];
+/// More than one sample.
+pub const MULTIPLE_SAMPLES: &[u32] = &[2, 4, 8, 16];
 
 /// A way to render a frame.
 pub trait Technique: Send + Sync {

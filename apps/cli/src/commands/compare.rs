@@ -5,7 +5,7 @@ use std::path::Path;
 use afterlight_image::Rgba8Image;
 use afterlight_measure::{Run, RunResult, SCHEMA, Status};
 use afterlight_report::{Picture, Report, Section, bytes_text, ms_text, psnr_text};
-use afterlight_techniques::{Exactness, Info, Params};
+use afterlight_techniques::{Exactness, Info, Params, view};
 use comfy_table::Table;
 
 use crate::args::{CommonArgs, CompareArgs};
@@ -133,6 +133,7 @@ pub fn compare(
                 chosen.technique.info(),
                 difference.psnr_or_infinity_db(),
                 common.samples,
+                common.view == view::FINAL,
                 &reference,
             );
             one.result.difference = Some(difference);
@@ -164,9 +165,16 @@ fn most_fragments(result: &RunResult) -> Option<u64> {
 }
 
 /// Marks a technique as failed whose image is further from the reference than it may be.
-fn judge(result: &mut RunResult, info: &Info, psnr_db: f64, samples: u32, reference: &Chosen) {
-    // Bounds are stated against forward.
-    if reference.id() != "forward" {
+fn judge(
+    result: &mut RunResult,
+    info: &Info,
+    psnr_db: f64,
+    samples: u32,
+    is_final: bool,
+    reference: &Chosen,
+) {
+    // Bounds are stated against forward's image.
+    if reference.id() != "forward" || !is_final {
         return;
     }
     let least_db = match info.exactness {
@@ -208,8 +216,14 @@ fn picture(measured: &Measured, truth: &Rgba8Image) -> Result<Option<Picture>, F
 
 /// The exit code's reason: techniques that broke off or whose images are off.
 pub fn verdict(run: &Run) -> Result<(), Failure> {
-    let failed: Vec<&RunResult> =
-        run.results.iter().filter(|result| result.status == Status::Failed).collect();
+    let dropped = |result: &&RunResult| {
+        result.counters.iter().any(|(name, count)| name.ends_with("_dropped") && count.as_u64() > Some(0))
+    };
+    let failed: Vec<&RunResult> = run
+        .results
+        .iter()
+        .filter(|result| result.status == Status::Failed || dropped(result))
+        .collect();
     let Some(first) = failed.first() else { return Ok(()) };
     let names: Vec<&str> = failed.iter().map(|result| result.technique.as_str()).collect();
     let reason = first.reason.as_deref().unwrap_or("no reason given");

@@ -65,6 +65,8 @@ pub fn run(args: &RenderArgs) -> Result<(), Failure> {
         _ => pictures::write_png(&args.output, &image)?,
     }
     let first_image_ms = ms_since(start);
+    // An image for which something was dropped is written, and said to be so.
+    let dropped = result.reason.clone();
     if let Some(path) = &args.stats {
         let run = Run {
             schema: SCHEMA,
@@ -81,7 +83,8 @@ pub fn run(args: &RenderArgs) -> Result<(), Failure> {
         };
         output::write_file(path, output::json_text(&run)?.as_bytes())?;
     }
-    session.finish(common, common.quiet)
+    session.finish(common, common.quiet)?;
+    dropped.map_or(Ok(()), |reason| Err(Failure::Failed(reason)))
 }
 
 /// Tells what was tolerated in the scene.

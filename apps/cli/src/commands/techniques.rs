@@ -89,5 +89,9 @@ fn range(param: &ParamInfo) -> String {
     match param.kind {
         ParamKind::Choice { values } => values.join("|"),
         ParamKind::Integer { min, max } => format!("{min} to {max}"),
+        ParamKind::AutoOrInteger { min, max } => format!("auto, {min} to {max}"),
+        ParamKind::Number { min, max } => format!("{min} to {max}"),
+        ParamKind::Words { values } => format!("none, {}", values.join("+")),
+        ParamKind::Text => "text".to_owned(),
     }
 }

@@ -40,6 +40,7 @@ static INFO: Info = Info {
     params: &[],
     needs: &[],
     samples: &[1],
+    views: &[],
 };
 
 impl Technique for Deferred {

@@ -43,6 +43,7 @@ static INFO: Info = Info {
     params: &[],
     needs: &[],
     samples: &[1],
+    views: &[],
 };
 
 /// Marks surfaces inside a closed volume, the eye inside or outside: faces behind the surface count, back faces up and

@@ -5,9 +5,12 @@
 use afterlight_graph::{DepthTest, Graph, ImageHandle, Load, StencilFace, StencilTest, gpu::vk};
 
 use crate::{
-    Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError,
+    ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError,
     cost::{Cost, Workload, depth_prepass},
+    forward::shaded_surfaces,
     geometry::Surfaces,
+    radiance_target::RadianceTarget,
+    view::{INVOCATIONS, InvocationCount},
 };
 
 /// The technique.
@@ -25,7 +28,7 @@ static INFO: Info = Info {
         surface: "nothing (depth)",
         lights: "loop over all",
         schedule: "fragment shader",
-        resolve: "one sample",
+        resolve: "average of the hardware's samples",
     },
     appendix_a: AppendixA {
         id: "DPP",
@@ -39,7 +42,8 @@ static INFO: Info = Info {
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
     params: &[],
     needs: &[],
-    samples: &[1],
+    samples: ANY_SAMPLES,
+    views: &["invocations"],
 };
 
 /// Lets the first fragment of a pixel pass and no other: where two surfaces have one depth, the first drawn wins, as in a
@@ -64,13 +68,12 @@ impl Technique for DepthPrepass {
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
-        let radiance =
-            graph.image("depth-prepass/radiance", frame.image_info(vk::Format::R16G16B16A16_SFLOAT));
-        let depth = graph.image("depth-prepass/depth", frame.image_info(vk::Format::D32_SFLOAT_S8_UINT));
+        let target = RadianceTarget::new(graph, frame, "depth-prepass");
+        let depth =
+            graph.image("depth-prepass/depth", frame.multisampled_info(vk::Format::D32_SFLOAT_S8_UINT));
         let depth_only = Surfaces::depth_only(frame)?;
-        let shaded = Surfaces::shaded(frame, "forward/forward.frag", "forward/forward.frag#mask")?
-            .depth(DepthTest::EQUAL)
-            .stencil(FIRST_FRAGMENT, 1);
+        let shaded = shaded_surfaces(frame)?.depth(DepthTest::EQUAL).stencil(FIRST_FRAGMENT, 1);
+        let mut count = frame.shows(INVOCATIONS).then(|| InvocationCount::new(graph, frame, "depth-prepass"));
 
         let mut pass = graph.raster("depth-prepass/depth");
         frame.bind_scene(&mut pass);
@@ -81,10 +84,11 @@ impl Technique for DepthPrepass {
 
         let mut pass = graph.raster("depth-prepass/shade");
         frame.bind_scene(&mut pass);
-        let radiance = pass.color(radiance, Load::Clear(frame.background()));
+        count = count.map(|count| count.bind(&mut pass));
+        let radiance = target.attach(frame, &mut pass);
         let _depth = pass.stencil(depth, Load::Keep);
         shaded.draw(frame, &mut pass);
         pass.finish();
-        Ok(radiance)
+        count.map_or(Ok(radiance), |count| count.heat(graph, frame, "depth-prepass"))
     }
 }

@@ -4,6 +4,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "shading.glsl"
 #include "surface_in.glsl"
+#include "invocations.glsl"
 
 layout(location = 0) out vec4 radiance_out;
 
@@ -11,13 +12,11 @@ void main() {
     MaterialData m = load_material(draw_material.y);
     SurfacePoint p = surface_point();
     vec4 base = visible_base_color(m, p);
+    count_invocation();
     Surface s = surface_at(m, p, base.rgb);
     vec3 radiance = unlit_radiance(s);
     if (!s.unlit) {
-        ShadingPoint point = shading_point(s);
-        for (uint i = 0u; i < frame.light_count; ++i) {
-            radiance += light_radiance(point, i);
-        }
+        radiance += all_lights_radiance(shading_point(s));
     }
     radiance_out = vec4(radiance, 1.0);
 }

@@ -5,9 +5,11 @@
 use afterlight_graph::{Graph, ImageHandle, Load, gpu::vk};
 
 use crate::{
-    Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError,
+    ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError,
     cost::{Cost, Workload, forward},
     geometry::Surfaces,
+    radiance_target::RadianceTarget,
+    view::{INVOCATIONS, InvocationCount},
 };
 
 /// The technique.
@@ -25,7 +27,7 @@ static INFO: Info = Info {
         surface: "nothing",
         lights: "loop over all",
         schedule: "fragment shader",
-        resolve: "one sample",
+        resolve: "average of the hardware's samples",
     },
     appendix_a: AppendixA {
         id: "F",
@@ -39,7 +41,8 @@ static INFO: Info = Info {
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
     params: &[],
     needs: &[],
-    samples: &[1],
+    samples: ANY_SAMPLES,
+    views: &["invocations"],
 };
 
 impl Technique for Forward {
@@ -52,16 +55,26 @@ impl Technique for Forward {
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
-        let radiance = graph.image("forward/radiance", frame.image_info(vk::Format::R16G16B16A16_SFLOAT));
-        let depth = graph.image("forward/depth", frame.image_info(vk::Format::D32_SFLOAT));
-        let surfaces = Surfaces::shaded(frame, "forward/forward.frag", "forward/forward.frag#mask")?;
+        let target = RadianceTarget::new(graph, frame, "forward");
+        let depth = graph.image("forward/depth", frame.multisampled_info(vk::Format::D32_SFLOAT));
+        let surfaces = shaded_surfaces(frame)?;
+        let mut count = frame.shows(INVOCATIONS).then(|| InvocationCount::new(graph, frame, "forward"));
 
         let mut pass = graph.raster("forward/shade");
         frame.bind_scene(&mut pass);
-        let radiance = pass.color(radiance, Load::Clear(frame.background()));
+        count = count.map(|count| count.bind(&mut pass));
+        let radiance = target.attach(frame, &mut pass);
         let _depth = pass.depth(depth, Load::Clear(0.0));
         surfaces.draw(frame, &mut pass);
         pass.finish();
-        Ok(radiance)
+        count.map_or(Ok(radiance), |count| count.heat(graph, frame, "forward"))
+    }
+}
+
+/// Surfaces shaded by a loop over all lights; they count their fragments where that is to be shown.
+pub(crate) fn shaded_surfaces(frame: &Frame<'_>) -> Result<Surfaces, TechniqueError> {
+    match frame.shows(INVOCATIONS) {
+        true => Surfaces::shaded(frame, "forward/forward.frag#count", "forward/forward.frag#mask-count"),
+        false => Surfaces::shaded(frame, "forward/forward.frag", "forward/forward.frag#mask"),
     }
 }

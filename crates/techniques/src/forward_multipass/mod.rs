@@ -51,6 +51,7 @@ static INFO: Info = Info {
     params: &[SCISSOR],
     needs: &[],
     samples: &[1],
+    views: &[],
 };
 
 /// Passes between two clears of the stencil: each has a reference of its own, from 1 to 255.

@@ -39,6 +39,8 @@ pub struct Surfaces {
     pub stencil_reference: u32,
     /// Blending of each colour attachment; empty replaces.
     pub blend: Vec<Blend>,
+    /// Specialization constants besides the scene's, for the fragment shader.
+    pub constants: Vec<(String, u32)>,
     /// Push constants of the fragment shader; empty where it has none.
     pub push: Vec<u8>,
     /// Scissor; `None` is the whole image.
@@ -88,6 +90,7 @@ impl Surfaces {
             stencil: None,
             stencil_reference: 0,
             blend: Vec::new(),
+            constants: Vec::new(),
             push: Vec::new(),
             scissor: None,
         })
@@ -142,6 +145,7 @@ impl Surfaces {
         let mut state = RasterState::new(&shaders.vertex, shaders.fragment.as_ref());
         let all: Vec<&Shader> = std::iter::once(&shaders.vertex).chain(&shaders.fragment).collect();
         state.constants = frame.constants(&all);
+        state.constants.extend(self.constants.iter().cloned());
         state.depth = self.depth;
         state.stencil = self.stencil;
         state.blend = self.blend.clone();

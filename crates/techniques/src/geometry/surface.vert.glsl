@@ -2,7 +2,7 @@
 //
 // One path for the position in all variants, `invariant`, so that passes with an equal depth test meet the depths of
 // the pass before. Variants: POSITION_ONLY (depth and IDs of opaque surfaces), WITH_UV (the same with coordinates for an
-// alpha test), none (all attributes).
+// alpha test), none (all attributes), CENTROID (and the position once more).
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "frame.glsl"
@@ -28,6 +28,9 @@ layout(location = 2) out vec4 color;
 layout(location = 3) out vec3 position_ws;
 layout(location = 4) out vec3 normal_ws;
 layout(location = 5) out vec4 tangent_ws;
+#ifdef CENTROID
+layout(location = 6) out vec3 centroid_position_ws;     // the same, read with centroid interpolation
+#endif
 #endif
 #endif
 
@@ -41,6 +44,9 @@ void main() {
 #ifndef WITH_UV
     bool mirrored = (draw_tail.w & DRAW_MIRRORED) != 0u;
     position_ws = world;
+#ifdef CENTROID
+    centroid_position_ws = world;
+#endif
     normal_ws = normal_to_world(object_row0, object_row1, object_row2, mirrored, unpack_normal(packed_normal_tangent_uv.x));
     tangent_ws = tangent_to_world(object_row0, object_row1, object_row2, mirrored, unpack_tangent(packed_normal_tangent_uv.y));
 #endif

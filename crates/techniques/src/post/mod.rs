@@ -10,7 +10,7 @@ use afterlight_graph::{
     gpu::{self, SamplerDesc, vk},
 };
 
-use crate::{error::TechniqueError, frame::Frame, geometry::Surfaces, present};
+use crate::{error::TechniqueError, frame::Frame, geometry::Surfaces, present, view};
 
 /// Layout in which uploads leave images.
 const UPLOADED: vk::ImageLayout = vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL;
@@ -57,8 +57,9 @@ pub(crate) fn finish(
     hdr: &ImageHandle,
     post: Post,
 ) -> Result<ImageHandle, TechniqueError> {
-    if post == Post::None {
-        return present::tonemap(graph, frame, hdr);
+    // A debug view is no picture: its colours are values.
+    if post == Post::None || !frame.shows(view::FINAL) {
+        return present::present(graph, frame, hdr);
     }
     let color = present::display(graph, frame, hdr, "post/color")?;
     let target = graph.image("final color", frame.image_info(vk::Format::R8G8B8A8_UNORM));

@@ -2,14 +2,15 @@
 
 use afterlight_graph::{Graph, ImageHandle, gpu::vk};
 
-use crate::{error::TechniqueError, frame::Frame};
+use crate::{error::TechniqueError, frame::Frame, view};
 
-/// Declares the pass `present/tonemap`: Khronos PBR Neutral, sRGB, 8 bits. Compute, since a full-screen fragment pass
+/// Declares the pass `present/tonemap`: Khronos PBR Neutral, sRGB, 8 bits; debug views, which are colours already, keep
+/// theirs. Compute, since a full-screen fragment pass
 /// would cost more on devices whose raster part is small.
 ///
 /// # Errors
 /// A shader that is not compiled in.
-pub fn tonemap(
+pub fn present(
     graph: &mut Graph,
     frame: &Frame<'_>,
     hdr: &ImageHandle,
@@ -30,7 +31,10 @@ pub(crate) fn display(
     name: &str,
 ) -> Result<ImageHandle, TechniqueError> {
     let target = graph.image(name, frame.image_info(vk::Format::R8G8B8A8_UNORM));
-    let shader = frame.shader("present/tonemap.comp")?;
+    let shader = match frame.shows(view::FINAL) {
+        true => frame.shader("present/tonemap.comp")?,
+        false => frame.shader("present/tonemap.comp#colors")?,
+    };
     let mut pass = frame.compute(graph, "present/tonemap", &shader);
     pass.read("hdr", hdr);
     let target = pass.write("final_color", target);

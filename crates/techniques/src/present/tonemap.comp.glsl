@@ -1,5 +1,5 @@
 // Linear HDR to the final image: Khronos PBR Neutral, sRGB, 8 bits. One thread a pixel, groups of 8x8.
-// In: hdr, RGBA16F, radiance. Out: final_color, RGBA8, sRGB-encoded. Twin: crates/oracle/src/tonemap.rs.
+// With DISPLAY_COLORS (debug views) without the tone map. In: hdr, RGBA16F, radiance. Out: final_color, RGBA8, sRGB-encoded. Twin: crates/oracle/src/tonemap.rs.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "frame.glsl"
@@ -14,6 +14,9 @@ void main() {
     if (any(greaterThanEqual(pixel, frame.size_px))) {
         return;
     }
-    vec3 radiance = texelFetch(hdr, ivec2(pixel), 0).rgb;
-    imageStore(final_color, ivec2(pixel), vec4(srgb_from_linear(clamp(pbr_neutral(radiance), 0.0, 1.0)), 1.0));
+    vec3 color = texelFetch(hdr, ivec2(pixel), 0).rgb;
+#ifndef DISPLAY_COLORS
+    color = pbr_neutral(color);
+#endif
+    imageStore(final_color, ivec2(pixel), vec4(srgb_from_linear(clamp(color, 0.0, 1.0)), 1.0));
 }

@@ -40,6 +40,7 @@ static INFO: Info = Info {
     params: &[],
     needs: &[],
     samples: &[1],
+    views: &[],
 };
 
 /// What a pixel without a surface holds: `NO_TRIANGLE` in `include/scene.glsl`.

@@ -47,9 +47,14 @@ impl Stage {
 
     /// A technique made ready.
     pub fn prepare(&self, technique: &dyn Technique, settings: &Settings) -> Prepared {
+        self.prepare_with(technique, settings, &Params::default())
+    }
+
+    /// A technique made ready with parameters.
+    pub fn prepare_with(&self, technique: &dyn Technique, settings: &Settings, params: &Params) -> Prepared {
         let renderer = Renderer::with_scene(&self.device, self.uploaded.clone(), settings)
             .unwrap_or_else(|e| panic!("{e}"));
-        let prepared = renderer.prepare(technique, &Params::default());
+        let prepared = renderer.prepare(technique, params);
         prepared.unwrap_or_else(|e| panic!("{}: {e}", technique.info().id))
     }
 

@@ -1,0 +1,129 @@
+//! Capacities of lists that can overflow: what a frame needed is counted on the device, and a frame that needed more is
+//! recorded again with room, or the result says what was dropped.
+
+use std::cell::RefCell;
+
+use afterlight_graph::{BufferHandle, Executor, Graph, ResourceId};
+use serde::Serialize;
+
+use crate::{error::TechniqueError, frame::Frame};
+
+/// A capacity that leaves less than this unused is kept; one that leaves more than half of itself unused as well is cut.
+const SLACK: u32 = 4096;
+
+/// What a frame counted of something that can overflow.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Counter {
+    /// What is counted: `blocks`.
+    pub name: String,
+    /// Elements that the frame asked for.
+    pub needed: u32,
+    /// Elements that there was room for.
+    pub capacity: u32,
+    /// What was dropped for want of room, in the counter's own unit (samples for `blocks`).
+    pub dropped: u32,
+    /// Whether the capacity was set by a parameter.
+    pub fixed: bool,
+}
+
+/// A counter on the device: two words, what was asked for and what was dropped.
+#[derive(Clone, Debug)]
+pub(crate) struct Demand {
+    name: &'static str,
+    resource: ResourceId,
+    capacity: u32,
+    fixed: bool,
+}
+
+impl Demand {
+    /// Reads the last frame's count.
+    pub fn read(&self, executor: &Executor) -> Result<Counter, TechniqueError> {
+        let bytes = executor.read_buffer(self.resource)?;
+        let word = |i: usize| {
+            bytes.get(4 * i..4 * i + 4).map_or(0, |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]))
+        };
+        Ok(Counter {
+            name: self.name.to_owned(),
+            needed: word(0),
+            capacity: self.capacity,
+            dropped: word(1),
+            fixed: self.fixed,
+        })
+    }
+}
+
+/// Capacities known from the frames before, and the counters that the frame being recorded has.
+#[derive(Default)]
+pub(crate) struct Capacities {
+    known: Vec<(String, u32)>,
+    demands: RefCell<Vec<Demand>>,
+}
+
+impl Capacities {
+    pub fn is_watched(&self) -> bool {
+        !self.demands.borrow().is_empty()
+    }
+
+    pub fn demands(&self) -> Vec<Demand> {
+        self.demands.borrow().clone()
+    }
+
+    /// Capacities for another recording, or `None` where those of this one fit what was counted.
+    pub fn next(&self, counters: &[Counter]) -> Option<Self> {
+        let fits = |c: &Counter| {
+            c.fixed
+                || c.needed <= c.capacity && (c.capacity - c.needed <= SLACK || c.capacity / 2 <= c.needed)
+        };
+        if counters.iter().all(fits) {
+            return None;
+        }
+        // An eighth more than needed: the next frame of a moving view needs a little more or less.
+        let room = |c: &Counter| c.needed.saturating_add(c.needed / 8).saturating_add(SLACK / 8);
+        let known =
+            counters.iter().map(|c| (c.name.clone(), if fits(c) { c.capacity } else { room(c) })).collect();
+        Some(Self { known, demands: RefCell::default() })
+    }
+}
+
+impl Frame<'_> {
+    /// The capacity that a list should have: what earlier frames needed, or `first_guess`.
+    pub fn capacity(&self, name: &str, first_guess: u32) -> u32 {
+        let known = self.capacities.known.iter().find(|(known, _)| known == name);
+        known.map_or(first_guess, |(_, capacity)| *capacity)
+    }
+
+    /// Has a list's counter read after each frame: two words, elements asked for and what was dropped. Where `fixed` is
+    /// false, a frame that asks for more than `capacity` is recorded again with room.
+    pub fn watch(
+        &self,
+        graph: &mut Graph,
+        name: &'static str,
+        counter: &BufferHandle,
+        capacity: u32,
+        fixed: bool,
+    ) {
+        let resource = graph.keep(counter);
+        self.capacities.demands.borrow_mut().push(Demand { name, resource, capacity, fixed });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn counter(needed: u32, capacity: u32, fixed: bool) -> Counter {
+        Counter { name: "blocks".to_owned(), needed, capacity, dropped: 0, fixed }
+    }
+
+    #[test]
+    fn what_overflows_gets_room_and_what_fits_stays() {
+        let capacities = Capacities::default();
+        assert!(capacities.next(&[counter(100, 100, false)]).is_none());
+        assert!(capacities.next(&[counter(200, 100, true)]).is_none(), "a fixed bound stays");
+        let next = capacities.next(&[counter(200_000, 100, false)]).expect("too small");
+        assert!(next.known[0].1 >= 200_000);
+        let next = capacities.next(&[counter(10, 1_000_000, false)]).expect("far too large");
+        assert!((10..10_000).contains(&next.known[0].1));
+        assert!(next.next(&[counter(10, next.known[0].1, false)]).is_none(), "settles");
+    }
+}

@@ -1,0 +1,62 @@
+//! `deferred-dedup`: a multisampled G-buffer with triangle IDs, shaded once a triangle and pixel.
+
+// ORDER: 120
+
+use afterlight_graph::{Graph, ImageHandle};
+
+use crate::{
+    Answers, AppendixA, Exactness, Frame, Info, MULTIPLE_SAMPLES, Params, Source, Technique, TechniqueError,
+    cost::{Cost, Workload, deferred_dedup},
+    multisample,
+};
+
+/// The technique.
+pub static TECHNIQUE: DeferredDedup = DeferredDedup;
+
+/// See the module.
+pub struct DeferredDedup;
+
+static INFO: Info = Info {
+    id: "deferred-dedup",
+    title: "Deferred shading once a triangle and pixel",
+    summary: "A multisampled G-buffer of 20 bytes a sample; samples of one triangle share one evaluation.",
+    sources: &[Source { key: "schied-2015", section: "5" }],
+    answers: Answers {
+        surface: "G-buffer, MSAA with triangle IDs",
+        lights: "loop over all, or tiles",
+        schedule: "compute, a thread a pixel",
+        resolve: "once a triangle",
+    },
+    appendix_a: AppendixA {
+        id: "DAA",
+        intersect: "imp",
+        transparency: "n",
+        hardware_msaa: "y",
+        light_access: "seq",
+        material_access: "rand",
+        rates_decoupled: "n, n",
+    },
+    exactness: Exactness::Exact { min_psnr_db: 50.0 },
+    params: &[multisample::LIGHTS],
+    needs: &[multisample::STANDARD_LOCATIONS],
+    samples: MULTIPLE_SAMPLES,
+    views: multisample::VIEWS,
+};
+
+impl Technique for DeferredDedup {
+    fn info(&self) -> &Info {
+        &INFO
+    }
+
+    fn predict(&self, workload: &Workload, _: &Params) -> Cost {
+        deferred_dedup(workload)
+    }
+
+    fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
+        let filled = multisample::fill_dedup(graph, frame, "deferred-dedup")?;
+        let lights = frame.params.text(&INFO, "lights");
+        multisample::shade(graph, frame, "deferred-dedup", ("dedup", frame.samples), lights, |pass| {
+            filled.bind(pass)
+        })
+    }
+}

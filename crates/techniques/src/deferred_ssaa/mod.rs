@@ -1,0 +1,65 @@
+//! `deferred-ssaa`: the whole G-buffer multisampled, every sample shaded.
+
+// ORDER: 100
+
+use afterlight_graph::{Graph, ImageHandle};
+
+use crate::{
+    Answers, AppendixA, Exactness, Frame, Info, MULTIPLE_SAMPLES, Params, Source, Technique, TechniqueError,
+    cost::{Cost, Workload, deferred_msaa},
+    multisample,
+};
+
+/// The technique.
+pub static TECHNIQUE: DeferredSsaa = DeferredSsaa;
+
+/// See the module.
+pub struct DeferredSsaa;
+
+static INFO: Info = Info {
+    id: "deferred-ssaa",
+    title: "Deferred shading of every sample",
+    summary: "The whole G-buffer is multisampled and every sample is shaded: what deferred shading with MSAA costs without thought.",
+    sources: &[
+        Source { key: "petrescu-2016", section: "4.4" },
+        Source { key: "fridvalszky-2020", section: "1.3" },
+    ],
+    answers: Answers {
+        surface: "G-buffer, multisampled",
+        lights: "loop over all, or tiles",
+        schedule: "compute, a thread a pixel",
+        resolve: "shade all samples",
+    },
+    appendix_a: AppendixA {
+        id: "DAA",
+        intersect: "imp",
+        transparency: "n",
+        hardware_msaa: "y",
+        light_access: "seq",
+        material_access: "rand",
+        rates_decoupled: "n, n",
+    },
+    exactness: Exactness::Exact { min_psnr_db: 50.0 },
+    params: &[multisample::LIGHTS],
+    needs: &[multisample::STANDARD_LOCATIONS],
+    samples: MULTIPLE_SAMPLES,
+    views: multisample::VIEWS,
+};
+
+impl Technique for DeferredSsaa {
+    fn info(&self) -> &Info {
+        &INFO
+    }
+
+    fn predict(&self, workload: &Workload, _: &Params) -> Cost {
+        deferred_msaa(workload)
+    }
+
+    fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
+        let filled = multisample::fill_samples(graph, frame, "deferred-ssaa")?;
+        let lights = frame.params.text(&INFO, "lights");
+        multisample::shade(graph, frame, "deferred-ssaa", ("ssaa", frame.samples), lights, |pass| {
+            filled.bind(pass)
+        })
+    }
+}

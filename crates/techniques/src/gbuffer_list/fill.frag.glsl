@@ -1,0 +1,46 @@
+// Builds the lists as the paper does (Fridvalszky and Toth 2020, section 3): after a depth pre-pass each fragment knows by
+// post-depth coverage which samples it shows; the one with sample 0 writes the pixel's own block, others take one from the
+// counter and link it.
+//
+// In: gbuffer_depth (for filters). Out: Blocks, BlockCount.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_post_depth_coverage : require
+#include "shading.glsl"
+#include "surface_in.glsl"
+#include "gbuffer_list/build_list.glsl"
+#include "gbuffer_list/filter.glsl"
+
+layout(early_fragment_tests) in;
+layout(post_depth_coverage) in;
+
+void main() {
+    MaterialData m = load_material(draw_material.y);
+    SurfacePoint p = surface_point();
+    vec4 base = visible_base_color(m, p);
+    Surface s = surface_at(m, p, base.rgb);
+    float distance_m = max(dot(frame.distance_from_world, vec4(p.position_ws, 1.0)), 0.0);
+
+    uint mask = uint(gl_SampleMaskIn[0]);
+    if (mask == 0u) {
+        return;
+    }
+    ivec2 pixel = ivec2(gl_FragCoord.xy);
+    bool single = FILTERS != 0u && (single_sample_pixel(pixel) || single_sample_surface(draw_material.x, distance_m));
+    Coverage own = Coverage(uint(bitCount(mask)), uint(findLSB(mask)));
+    uint head = pixel_block(pixel);
+    if (own.index == 0u) {
+        own.count = single ? SAMPLES : own.count;
+        store_block(head, s, distance_m, own);
+    } else if (!single) {
+        uint place = atomicAdd(blocks_needed, 1u);
+        if (place < BLOCK_CAPACITY) {
+            uint block = frame.size_px.x * frame.size_px.y + place;
+            store_block(block, s, distance_m, own);
+            uint next = atomicExchange(blocks[pointer_word(head)], pack_pointer(block, own));
+            blocks[pointer_word(block)] = next;
+        } else {
+            atomicAdd(samples_dropped, own.count);
+        }
+    }
+}

@@ -1,0 +1,324 @@
+//! `gbuffer-list`: a G-buffer of per-pixel lists that holds each visible surface of a pixel once (Fridvalszky and Tóth 2020).
+
+// ORDER: 130
+
+mod filter;
+
+use afterlight_graph::{BufferHandle, DepthTest, Graph, ImageHandle, Load, gpu::vk};
+
+use crate::{
+    ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, ParamInfo, ParamKind, Params, Source, Technique,
+    TechniqueError,
+    cost::{self, Cost, Workload},
+    depth_prepass::FIRST_FRAGMENT,
+    geometry::Surfaces,
+    multisample::{self, NO_TRIANGLE_RGBA8},
+};
+
+/// The technique.
+pub static TECHNIQUE: GbufferList = GbufferList;
+
+/// See the module.
+pub struct GbufferList;
+
+const FILL: ParamInfo = ParamInfo {
+    key: "fill",
+    summary: "who builds the lists: compute over a multisampled visibility buffer, or a second raster pass after a depth pre-pass (the paper's)",
+    kind: ParamKind::Choice { values: &["compute", "raster"] },
+    default: "compute",
+};
+const BLOCKS: ParamInfo = ParamInfo {
+    key: "blocks",
+    summary: "dynamic blocks; auto: as many as the view needs, counted; fixed: what finds none is dropped and told",
+    kind: ParamKind::AutoOrInteger { min: 0, max: u32::MAX },
+    default: "auto",
+};
+const POINTER: ParamInfo = ParamInfo {
+    key: "pointer",
+    summary: "narrow: 26 bits of index and 3 + 3 of coverage, up to 8 samples and 2^26 blocks; wide: 64 bits; auto: narrow where it suffices",
+    kind: ParamKind::Choice { values: &["auto", "narrow", "wide"] },
+    default: "auto",
+};
+const POSITION: ParamInfo = ParamInfo {
+    key: "position",
+    summary: "where a block's position comes from: the depth buffer at one of its samples (the paper's), or a distance in the block, 32 bits more, exact at the pixel's centre",
+    kind: ParamKind::Choice { values: &["distance", "depth"] },
+    default: "distance",
+};
+
+static INFO: Info = Info {
+    id: "gbuffer-list",
+    title: "G-buffer of per-pixel lists",
+    summary: "Each visible surface of a pixel stands once, in a block of 112 bits; blocks beyond the first are linked on demand.",
+    sources: &[Source { key: "fridvalszky-2020", section: "3 to 5" }],
+    answers: Answers {
+        surface: "G-buffer, per-pixel lists",
+        lights: "loop over all, or tiles",
+        schedule: "compute, a thread a pixel",
+        resolve: "once a triangle, weighted by coverage",
+    },
+    appendix_a: AppendixA {
+        id: "DAA",
+        intersect: "imp",
+        transparency: "n",
+        hardware_msaa: "y",
+        light_access: "seq",
+        material_access: "rand",
+        rates_decoupled: "n, n",
+    },
+    exactness: Exactness::Exact { min_psnr_db: 50.0 },
+    params: &[
+        multisample::LIGHTS,
+        FILL,
+        BLOCKS,
+        POINTER,
+        POSITION,
+        filter::FILTER,
+        filter::REGION,
+        filter::LEFT,
+        filter::TOP,
+        filter::RIGHT,
+        filter::BOTTOM,
+        filter::DEPTH_THRESHOLD,
+        filter::OBJECTS,
+        filter::EDGE_THRESHOLD,
+    ],
+    needs: &[multisample::STANDARD_LOCATIONS],
+    samples: ANY_SAMPLES,
+    views: multisample::VIEWS,
+};
+
+/// Most blocks that a narrow pointer tells apart: 26 bits of index.
+const NARROW_BLOCKS_MAX: u64 = 1 << 26;
+/// Most samples that a narrow pointer tells apart: 3 bits.
+const NARROW_SAMPLES_MAX: u32 = 8;
+/// Samples a pixel that the first frame of a view is given room for: a quarter of the pixels lie on edges.
+const FIRST_GUESS_PIXELS: u32 = 4;
+
+/// How the blocks of a frame are laid out.
+struct Layout {
+    /// Samples a pixel. One where no pixel may hold more than its own block and compute fills: then more have no use.
+    samples: u32,
+    /// Dynamic blocks.
+    capacity: u32,
+    /// The capacity is the user's: what finds no block is dropped.
+    is_fixed: bool,
+    /// 32-bit words of a pointer: 1 or 2.
+    pointer_words: u32,
+    distance_words: u32,
+    emission_words: u32,
+    /// No filter and no bound drops samples.
+    keeps_all: bool,
+    blocks: u64,
+}
+
+impl Layout {
+    fn new(frame: &Frame<'_>) -> Result<Self, TechniqueError> {
+        let params = frame.params;
+        let pixels = u64::from(frame.width_px) * u64::from(frame.height_px);
+        let fixed: Option<u32> = params.text(&INFO, BLOCKS.key).parse().ok();
+        let first_guess = u32::try_from(pixels / u64::from(FIRST_GUESS_PIXELS)).unwrap_or(u32::MAX);
+        let capacity = fixed.unwrap_or_else(|| frame.capacity("blocks", first_guess));
+        let blocks = pixels + u64::from(capacity);
+        let by_compute = params.text(&INFO, FILL.key) == "compute";
+        let samples = if capacity == 0 && fixed.is_some() && by_compute { 1 } else { frame.samples };
+        let narrow = blocks <= NARROW_BLOCKS_MAX && samples <= NARROW_SAMPLES_MAX;
+        let pointer_words = match (params.text(&INFO, POINTER.key), narrow) {
+            ("narrow", false) => {
+                return Err(TechniqueError::Conflict {
+                    technique: INFO.id,
+                    found: format!("pointer=narrow with {samples} samples and {blocks} blocks"),
+                    expected: format!(
+                        "at most {NARROW_SAMPLES_MAX} samples and {NARROW_BLOCKS_MAX} blocks, or pointer=wide"
+                    ),
+                });
+            }
+            ("wide", _) | (_, false) => 2,
+            _ => 1,
+        };
+        let in_block = params.text(&INFO, POSITION.key) == "distance";
+        Ok(Self {
+            samples,
+            capacity,
+            is_fixed: fixed.is_some(),
+            pointer_words,
+            distance_words: u32::from(in_block),
+            emission_words: u32::from(frame.scene.has_emission),
+            keeps_all: fixed.is_none() && filter::bits(&INFO, params) == 0,
+            blocks,
+        })
+    }
+
+    /// Words of two interleaved blocks: seven in the paper (Figure 3).
+    fn pair_words(&self) -> u32 {
+        5 + 2 * (self.pointer_words + self.distance_words + self.emission_words)
+    }
+
+    /// Bytes of all blocks. An error where a shader cannot reach them through one binding.
+    fn bytes(&self, frame: &Frame<'_>) -> Result<u64, TechniqueError> {
+        let words = self.blocks.div_ceil(2) * u64::from(self.pair_words());
+        let limit = frame.features().max_storage_buffer_range.min(4 * u64::from(u32::MAX));
+        if 4 * words > limit {
+            return Err(TechniqueError::TooLarge {
+                what: format!(
+                    "gbuffer-list: bytes of {} blocks of {} bits",
+                    self.blocks,
+                    16 * self.pair_words()
+                ),
+                found: 4 * words,
+                limit,
+            });
+        }
+        Ok(4 * words)
+    }
+
+    fn constants(&self) -> [(&'static str, u32); 3] {
+        [
+            ("POINTER_WORDS", self.pointer_words),
+            ("DISTANCE_WORDS", self.distance_words),
+            ("EMISSION_WORDS", self.emission_words),
+        ]
+    }
+}
+
+/// The lists of a frame: blocks, and the counter of dynamic ones.
+struct Lists {
+    blocks: BufferHandle,
+    count: BufferHandle,
+    depth: ImageHandle,
+}
+
+impl Technique for GbufferList {
+    fn info(&self) -> &Info {
+        &INFO
+    }
+
+    fn predict(&self, workload: &Workload, params: &Params) -> Cost {
+        cost::gbuffer_list(workload, params.text(&INFO, FILL.key) == "compute")
+    }
+
+    fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
+        let layout = Layout::new(frame)?;
+        let by_raster = frame.params.text(&INFO, FILL.key) == "raster";
+        let lists = match by_raster {
+            true => fill_by_raster(graph, frame, &layout)?,
+            false => fill_by_compute(graph, frame, &layout)?,
+        };
+        frame.watch(graph, "blocks", &lists.count, layout.capacity, layout.is_fixed);
+        let lights = frame.params.text(&INFO, multisample::LIGHTS.key);
+        let source = if layout.samples == 1 { "list-one" } else { "list" };
+        multisample::shade(graph, frame, INFO.id, (source, layout.samples), lights, |pass| {
+            for (name, value) in layout.constants() {
+                pass.constant(name, value);
+            }
+            pass.constant("KEEPS_ALL", u32::from(layout.keeps_all));
+            pass.read("Blocks", &lists.blocks);
+            pass.read("gbuffer_depth", &lists.depth);
+        })
+    }
+}
+
+/// Blocks and counter, cleared.
+fn empty_lists(
+    graph: &mut Graph,
+    frame: &Frame<'_>,
+    layout: &Layout,
+) -> Result<(BufferHandle, BufferHandle, BufferHandle), TechniqueError> {
+    let blocks = graph.buffer("gbuffer-list/blocks", layout.bytes(frame)?);
+    let count = graph.buffer("gbuffer-list/block count", 8);
+    let objects = frame.params.text(&INFO, filter::OBJECTS.key);
+    let flagged =
+        frame.table(graph, "gbuffer-list/flagged draws", &filter::flagged_draws(frame.scene, objects))?;
+    let blocks = graph.clear_buffer("gbuffer-list/clear blocks", blocks, 0);
+    let count = graph.clear_buffer("gbuffer-list/clear count", count, 0);
+    Ok((blocks, count, flagged))
+}
+
+/// Specialization constants of shaders that build the lists.
+fn build_constants(frame: &Frame<'_>, layout: &Layout) -> Vec<(String, u32)> {
+    let mut all = filter::constants(&INFO, frame.params);
+    all.extend(layout.constants().map(|(name, value)| (name.to_owned(), value)));
+    all.push(("SAMPLES".to_owned(), layout.samples));
+    all.push(("BLOCK_CAPACITY".to_owned(), layout.capacity));
+    all
+}
+
+/// Triangle IDs at every sample in one pass over the scene, then a thread a pixel that writes its list.
+fn fill_by_compute(graph: &mut Graph, frame: &Frame<'_>, layout: &Layout) -> Result<Lists, TechniqueError> {
+    let ids =
+        graph.image("gbuffer-list/ids", frame.image_info(vk::Format::R8G8B8A8_UNORM).samples(layout.samples));
+    let depth =
+        graph.image("gbuffer-list/depth", frame.image_info(vk::Format::D32_SFLOAT).samples(layout.samples));
+    let surfaces = Surfaces::new(
+        frame,
+        ("geometry/surface.vert#position", Some("visibility/ids.frag#rgba8")),
+        ("geometry/surface.vert#uv", "visibility/ids.frag#rgba8-mask"),
+    )?;
+    let (blocks, count, flagged) = empty_lists(graph, frame, layout)?;
+
+    let mut pass = graph.raster("gbuffer-list/ids");
+    frame.bind_scene(&mut pass);
+    let ids = pass.color(ids, Load::Clear(NO_TRIANGLE_RGBA8));
+    let depth = pass.depth(depth, Load::Clear(0.0));
+    surfaces.draw(frame, &mut pass);
+    pass.finish();
+
+    let shader = if layout.samples == 1 { "gbuffer_list/fill.comp#one" } else { "gbuffer_list/fill.comp" };
+    let mut pass = frame.compute(graph, "gbuffer-list/fill", &frame.shader(shader)?);
+    for (name, value) in build_constants(frame, layout) {
+        pass.constant(&name, value);
+    }
+    pass.read("ids", &ids).read("gbuffer_depth", &depth).read("SingleSampleDraws", &flagged);
+    let blocks = pass.write("Blocks", blocks);
+    let count = pass.write("BlockCount", count);
+    pass.dispatch(frame.groups(8));
+    pass.finish();
+    Ok(Lists { blocks, count, depth })
+}
+
+/// A depth pre-pass, then fragments that write themselves where they show (the paper's section 3).
+fn fill_by_raster(graph: &mut Graph, frame: &Frame<'_>, layout: &Layout) -> Result<Lists, TechniqueError> {
+    if !frame.features().post_depth_coverage {
+        return Err(TechniqueError::Unavailable {
+            technique: INFO.id,
+            missing: "post-depth coverage for fill=raster (fill=compute does without)".to_owned(),
+        });
+    }
+    if filter::bits(&INFO, frame.params) & filter::EDGES != 0 {
+        return Err(TechniqueError::Conflict {
+            technique: INFO.id,
+            found: "filter=edges with fill=raster, where a fragment does not know the other surfaces of its pixel".to_owned(),
+            expected: "filter=depth-edges, or fill=compute".to_owned(),
+        });
+    }
+    let depth =
+        graph.image("gbuffer-list/depth", frame.multisampled_info(frame.small_depth_stencil_format()));
+    let depth_only = Surfaces::depth_only(frame)?;
+    let (opaque, masked) = match layout.samples {
+        1 => ("gbuffer_list/fill.frag#one", "gbuffer_list/fill.frag#one-mask"),
+        _ => ("gbuffer_list/fill.frag", "gbuffer_list/fill.frag#mask"),
+    };
+    let mut fill = Surfaces::shaded(frame, opaque, masked)?
+        .depth(DepthTest::EQUAL)
+        // Section 4.3: one bit of stencil against double writes of intersecting triangles.
+        .stencil(FIRST_FRAGMENT, 1);
+    fill.constants = build_constants(frame, layout);
+    let (blocks, count, flagged) = empty_lists(graph, frame, layout)?;
+
+    let mut pass = graph.raster("gbuffer-list/depth");
+    frame.bind_scene(&mut pass);
+    let depth = pass.depth(depth, Load::Clear(0.0));
+    pass.stencil_clear(0);
+    depth_only.draw(frame, &mut pass);
+    pass.finish();
+
+    let mut pass = graph.raster("gbuffer-list/fill");
+    frame.bind_scene(&mut pass);
+    pass.read("gbuffer_depth", &depth).read("SingleSampleDraws", &flagged);
+    let blocks = pass.write("Blocks", blocks);
+    let count = pass.write("BlockCount", count);
+    let depth = pass.stencil(depth, Load::Keep);
+    fill.draw(frame, &mut pass);
+    pass.finish();
+    Ok(Lists { blocks, count, depth })
+}

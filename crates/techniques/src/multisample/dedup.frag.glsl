@@ -1,0 +1,38 @@
+// Fills the G-buffer of the DAIS paper's baseline, 20 bytes a sample with depth (Schied and Dachsbacher 2015, section 5):
+// surface albedo, a triangle ID, linear depth, quantised normal. Where they have a material ID, here are metalness,
+// roughness and occlusion: textures vary them, and the triangle ID names the material as well.
+//
+// Out, RGBA8 each, since some devices have no multisampled integer formats: 0 base colour (sRGB) and metalness; 1 normal, world
+// space, octahedral, 2 x 12 bits, and roughness (0: takes no light); 2 triangle ID; 3 view distance, m, at the pixel's
+// centre, the upper 24 bits of a positive float (8 exponent, 16 mantissa: 2^-17), and occlusion; with EMISSION 4 radiance,
+// B10G11R11.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "shading.glsl"
+#include "surface_in.glsl"
+
+layout(location = 0) out vec4 base_color_metallic;
+layout(location = 1) out vec4 normal_roughness;
+layout(location = 2) out vec4 triangle_id;
+layout(location = 3) out vec4 distance_occlusion;
+#ifdef EMISSION
+layout(location = 4) out vec3 emission;
+#endif
+
+void main() {
+    MaterialData m = load_material(draw_material.y);
+    SurfacePoint p = surface_point();
+    vec4 base = visible_base_color(m, p);
+    Surface s = surface_at(m, p, base.rgb);
+    base_color_metallic = vec4(s.base_color, s.metallic);
+    uvec2 normal = uvec2(round((octahedral_encode(s.normal_ws) * 0.5 + 0.5) * 4095.0));
+    uint roughness = s.unlit ? 0u : uint(round(clamp(s.roughness, MIN_ROUGHNESS, 1.0) * 255.0));
+    normal_roughness = unpackUnorm4x8(normal.x | normal.y << 12 | roughness << 24);
+    triangle_id = unpackUnorm4x8(draw_material.x << TRIANGLE_BITS | uint(gl_PrimitiveID));
+    float distance_m = max(dot(frame.distance_from_world, vec4(p.position_ws, 1.0)), 0.0);
+    uint distance_bits = min(floatBitsToUint(distance_m) + 64u >> 7, 0xffffffu);
+    distance_occlusion = unpackUnorm4x8(distance_bits | uint(round(s.occlusion * 255.0)) << 24);
+#ifdef EMISSION
+    emission = s.unlit ? vec3(0.0) : s.emission;
+#endif
+}

@@ -1,0 +1,45 @@
+// Shades the surfaces of a pixel and averages them by their weights, whatever holds them: a SOURCE_* macro names it.
+//
+// A source has four parts: source_begin(pixel), source_next(surface, weight) until it is false, and source_background, the
+// samples without a surface; source_distance(pixel, sample) bounds what lights must reach. Weights are samples; they and the background sum to SAMPLES.
+#include "shading.glsl"
+#include "heat.glsl"
+#include "multisample/samples.glsl"
+
+layout(set = 0, binding = 8) uniform SAMPLED_IMAGE gbuffer_depth;
+
+#if defined(SOURCE_DEDUP)
+#include "multisample/source_dedup.glsl"
+#elif defined(SOURCE_LIST)
+#include "gbuffer_list/source_list.glsl"
+#else
+#include "multisample/source_samples.glsl"
+#endif
+
+// 0 the image, 1 sample-usage, 2 invocations, 3 edges, 4 weights (techniques/src/view/mod.rs).
+layout(constant_id = 9) const uint VIEW = 0u;
+
+uint shaded_count;  // surfaces shaded
+uint weight_sum;
+
+// Radiance of a pixel from the sum over its surfaces, or what a view shows of it.
+vec3 resolved(vec3 weighted_radiance) {
+    if (VIEW == 1u) {
+        return sample_usage_color(shaded_count, SAMPLES);
+    }
+    if (VIEW == 2u) {
+        return invocations_color(shaded_count);
+    }
+    if (VIEW == 3u) {
+        return vec3(shaded_count > 1u ? 1.0 : 0.0);
+    }
+    if (VIEW == 4u) {
+        return vec3(weight_sum + source_background == SAMPLES ? 0.0 : 1.0, 0.0, 0.0);
+    }
+    if (weight_sum == 0u) {
+        return frame.background_radiance;
+    }
+    // Samples that a list dropped take the colour of the others; else the factor is exactly 1.
+    float of_surfaces = float(SAMPLES - source_background) / float(weight_sum);
+    return (weighted_radiance * of_surfaces + float(source_background) * frame.background_radiance) / float(SAMPLES);
+}

@@ -1,0 +1,85 @@
+// Surfaces of a pixel from the multisampled G-buffer that samples.frag.glsl fills.
+//
+// SOURCE_SSAA: every sample. SOURCE_MSAA: every sample where a triangle's edge crosses the pixel, else the first alone;
+// PIXEL_RATE and SAMPLE_RATE say which before.
+layout(set = 0, binding = 9) uniform texture2DMS gbuffer_base_color;
+layout(set = 0, binding = 10) uniform texture2DMS gbuffer_normal;
+layout(set = 0, binding = 11) uniform texture2DMS gbuffer_roughness;
+#ifdef EMISSION
+layout(set = 0, binding = 12) uniform texture2DMS gbuffer_emission;
+#endif
+
+ivec2 source_pixel;
+uint source_index;          // next sample to look at
+uint source_end;
+uint source_weight;
+uint source_background;     // samples without a surface
+
+bool is_edge(ivec2 pixel) {
+    float edge = 0.0;
+    for (uint i = 0u; i < SAMPLES; ++i) {
+        edge = max(edge, texelFetch(gbuffer_roughness, pixel, int(i)).b);
+    }
+    return edge > 0.5;
+}
+
+void source_begin(ivec2 pixel) {
+    source_pixel = pixel;
+    source_index = 0u;
+    source_background = 0u;
+#if defined(SOURCE_SSAA) || defined(SAMPLE_RATE)
+    bool sample_rate = true;
+#elif defined(PIXEL_RATE)
+    bool sample_rate = false;
+#else
+    bool sample_rate = is_edge(pixel);
+#endif
+    source_end = sample_rate ? SAMPLES : 1u;
+    source_weight = sample_rate ? 1u : SAMPLES;
+}
+
+// View distance of a sample, negative without a surface.
+float source_distance(ivec2 pixel, uint i) {
+    float depth = texelFetch(gbuffer_depth, pixel, int(i)).r;
+    return depth == 0.0 ? -1.0 : distance_from_depth(depth);
+}
+
+// Depth at the centre of a pixel that one triangle covers: depth is affine on the screen, and the mean of the standard
+// locations is the centre.
+float center_depth(ivec2 pixel) {
+    float sum = 0.0;
+    for (uint i = 0u; i < SAMPLES; ++i) {
+        sum += texelFetch(gbuffer_depth, pixel, int(i)).r;
+    }
+    return sum / float(SAMPLES);
+}
+
+bool source_next(out Surface s, out uint weight) {
+    float depth = 0.0;
+    uint i = 0u;
+    while (depth == 0.0 && source_index < source_end) {
+        i = source_index++;
+        depth = texelFetch(gbuffer_depth, source_pixel, int(i)).r;
+        source_background += depth == 0.0 ? source_weight : 0u;
+    }
+    if (depth == 0.0) {
+        return false;
+    }
+    vec4 base = texelFetch(gbuffer_base_color, source_pixel, int(i));
+    vec2 roughness_occlusion = texelFetch(gbuffer_roughness, source_pixel, int(i)).rg;
+    bool at_center = source_weight == SAMPLES;
+    s.position_ws = at_center ? position_from_depth(ndc_from_pixel(uvec2(source_pixel)), center_depth(source_pixel))
+                              : position_from_depth(ndc_from_sample(source_pixel, i), depth);
+    s.normal_ws = octahedral_decode(texelFetch(gbuffer_normal, source_pixel, int(i)).rg * 2.0 - 1.0);
+    s.base_color = base.rgb;
+    s.metallic = base.a;
+    s.roughness = roughness_occlusion.r;
+    s.occlusion = roughness_occlusion.g;
+    s.unlit = s.roughness == 0.0;
+    s.emission = vec3(0.0);
+#ifdef EMISSION
+    s.emission = texelFetch(gbuffer_emission, source_pixel, int(i)).rgb;
+#endif
+    weight = source_weight;
+    return true;
+}

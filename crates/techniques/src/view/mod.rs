@@ -1,0 +1,67 @@
+//! Debug views: heat images of what a technique did in each pixel.
+//!
+//! A view is an image of display colours in place of radiance; it is shown without tone mapping.
+
+use afterlight_graph::{Graph, ImageHandle, RasterPass, gpu::vk};
+
+use crate::{error::TechniqueError, frame::Frame};
+
+/// The image itself.
+pub const FINAL: &str = "final";
+/// Shading runs a pixel.
+pub const INVOCATIONS: &str = "invocations";
+/// Shading samples that a pixel keeps: black 1, red as many as it has visibility samples (Fridvalszky and Tóth 2020,
+/// Figure 5).
+pub const SAMPLE_USAGE: &str = "sample-usage";
+/// Pixels that are shaded at more than pixel rate.
+pub const EDGES: &str = "edges";
+/// Pixels whose weights do not sum to the number of samples: red; others are black.
+pub const WEIGHTS: &str = "weights";
+
+/// Number of a view in `multisample/shade.glsl`.
+pub fn number(view: &str) -> u32 {
+    match view {
+        SAMPLE_USAGE => 1,
+        INVOCATIONS => 2,
+        EDGES => 3,
+        WEIGHTS => 4,
+        _ => 0,
+    }
+}
+
+/// A count a pixel that fragment shaders add to.
+pub struct InvocationCount(ImageHandle);
+
+impl InvocationCount {
+    /// Declares the count, zero everywhere.
+    pub fn new(graph: &mut Graph, frame: &Frame<'_>, technique: &str) -> Self {
+        let image =
+            graph.image(&format!("{technique}/invocation count"), frame.image_info(vk::Format::R32_UINT));
+        Self(graph.clear_image(&format!("{technique}/clear count"), image, [0.0; 4]))
+    }
+
+    /// Binds it to a pass whose shaders were compiled with COUNT_INVOCATIONS.
+    pub fn bind(self, pass: &mut RasterPass<'_>) -> Self {
+        Self(pass.write("invocation_count", self.0))
+    }
+
+    /// Declares the pass that turns it into colours.
+    ///
+    /// # Errors
+    /// A shader that is not compiled in.
+    pub fn heat(
+        self,
+        graph: &mut Graph,
+        frame: &Frame<'_>,
+        technique: &str,
+    ) -> Result<ImageHandle, TechniqueError> {
+        let target =
+            graph.image(&format!("{technique}/heat"), frame.image_info(vk::Format::R16G16B16A16_SFLOAT));
+        let mut pass = frame.compute(graph, &format!("{technique}/heat"), &frame.shader("view/heat.comp")?);
+        pass.read("invocation_count", &self.0);
+        let target = pass.write("hdr", target);
+        pass.dispatch(frame.groups(8));
+        pass.finish();
+        Ok(target)
+    }
+}

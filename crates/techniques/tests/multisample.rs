@@ -1,0 +1,245 @@
+//! Techniques of several samples a pixel against `forward` at as many (ladder step d).
+
+mod common;
+
+use afterlight_techniques::{Params, Settings, Technique, find, graph::gpu, registry, scene::Camera};
+use common::{Stage, image_of, psnr};
+use glam::Vec3;
+
+/// Least PSNR to `forward` at as many samples, dB (contract).
+const MIN_PSNR_DB: f64 = 40.0;
+
+/// Sample counts beyond one that the device has, of those that techniques are tested at.
+fn counts(device: &gpu::Device) -> Vec<u32> {
+    [4, 8].into_iter().filter(|count| device.features().supports_samples(*count, false)).collect()
+}
+
+/// Parameters that change how a technique works, each with the values that are compared.
+const COMPARED: &[(&str, &[&str])] = &[("lights", &["all", "tiled"]), ("fill", &["compute", "raster"])];
+
+/// A technique's parameters from `key=value` words.
+fn params(technique: &dyn Technique, sets: &[(&str, &str)]) -> Params {
+    let mut params = Params::default();
+    for (key, value) in sets {
+        params.set(technique.info(), key, value).unwrap_or_else(|e| panic!("{e}"));
+    }
+    params
+}
+
+/// Every technique that renders several samples, with every value of the compared parameters.
+fn variants() -> Vec<(&'static dyn Technique, Params, String)> {
+    let mut all = Vec::new();
+    for technique in registry().iter().copied().filter(|t| t.info().samples.contains(&4)) {
+        let info = technique.info();
+        let mut sets: Vec<Vec<(&str, &str)>> = vec![Vec::new()];
+        for (key, values) in COMPARED.iter().filter(|(key, _)| info.params.iter().any(|p| p.key == *key)) {
+            sets = sets
+                .iter()
+                .flat_map(|set| values.iter().map(|value| [&set[..], &[(*key, *value)]].concat()))
+                .collect();
+        }
+        for set in sets {
+            let words: Vec<&str> = set.iter().map(|(_, value)| *value).collect();
+            all.push((technique, params(technique, &set), format!("{} {}", info.id, words.join(" "))));
+        }
+    }
+    all
+}
+
+fn all_agree(stage: &Stage, settings: &Settings, what: &str, runs: usize) {
+    for samples in counts(&stage.device) {
+        let settings = Settings { samples, ..settings.clone() };
+        let reference = stage.image(find("forward").unwrap(), &settings);
+        for (technique, params, name) in variants() {
+            let mut prepared = stage.prepare_with(technique, &settings, &params);
+            for run in 0..runs {
+                let db = psnr(&reference, &image_of(&mut prepared));
+                println!("{what}, {samples} samples: {name} run {run}: {db:.2} dB");
+                assert!(
+                    db >= MIN_PSNR_DB,
+                    "{what}, {samples} samples: {name} run {run}: {db:.2} dB to forward"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn on_the_colonnade() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=30000");
+    all_agree(&stage, &stage.settings((160, 90), 100), "colonnade", 2);
+}
+
+#[test]
+fn on_intersecting_triangles() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:intersect");
+    all_agree(&stage, &stage.settings((161, 91), 20), "intersect", 2);
+}
+
+#[test]
+fn on_sponza() {
+    let gpu = afterlight_testkit::gpu();
+    let Some(scenes) = afterlight_testkit::shared_scenes() else { return };
+    let stage = Stage::new(&gpu, &scenes.join("sponza/sponza.gltf").to_string_lossy());
+    let camera =
+        Camera::look_at("view", Vec3::new(-9.0, 2.5, 0.0), Vec3::new(5.0, 3.0, 0.0), 60f32.to_radians(), 0.1);
+    all_agree(&stage, &stage.from(camera, (320, 180), 100), "sponza", 1);
+}
+
+/// One sample is not several: a comparison that cannot tell would prove nothing.
+#[test]
+fn one_sample_is_caught() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=30000");
+    let settings = stage.settings((160, 90), 100);
+    let forward = find("forward").unwrap();
+    for samples in counts(&gpu) {
+        let several = stage.image(forward, &Settings { samples, ..settings.clone() });
+        let db = psnr(&stage.image(forward, &settings), &several);
+        assert!(db < MIN_PSNR_DB - 5.0, "a mutant within the bound: {db:.2} dB");
+    }
+}
+
+/// `gbuffer-list` with parameters, and the pixels of an image that are not black.
+fn list_image(stage: &Stage, settings: &Settings, sets: &[(&str, &str)]) -> afterlight_image::Rgba8Image {
+    let list = find("gbuffer-list").unwrap();
+    image_of(&mut stage.prepare_with(list, settings, &params(list, sets)))
+}
+
+fn pixels_not_black(image: &afterlight_image::Rgba8Image) -> usize {
+    image.pixels.chunks_exact(4).filter(|p| p[..3] != [0, 0, 0]).count()
+}
+
+/// The weights of every pixel sum to the samples, on intersecting triangles as well.
+#[test]
+fn weights_sum_to_the_samples() {
+    let gpu = afterlight_testkit::gpu();
+    for source in [
+        "builtin:intersect",
+        "builtin:colonnade?triangles=30000&texture=64",
+        "builtin:edge",
+        "builtin:spheres",
+    ] {
+        let stage = Stage::new(&gpu, source);
+        for samples in counts(&gpu) {
+            let settings = Settings { samples, view: "weights".to_owned(), ..stage.settings((161, 91), 2) };
+            for (technique, params, name) in variants() {
+                if !technique.info().views.contains(&"weights") {
+                    continue;
+                }
+                let off = pixels_not_black(&image_of(&mut stage.prepare_with(technique, &settings, &params)));
+                println!("{source}, {samples} samples: {name}: {off} pixels");
+                assert_eq!(off, 0, "{source}, {samples} samples: {name}: pixels whose weights are off");
+            }
+        }
+    }
+}
+
+/// Lists with room for all equal what holds every sample, whatever the layout of their blocks.
+#[test]
+fn lists_equal_the_deduplicated_samples() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=30000");
+    for samples in counts(&gpu) {
+        let settings = Settings { samples, ..stage.settings((320, 180), 100) };
+        let dedup = stage.image(find("deferred-dedup").unwrap(), &settings);
+        for sets in [
+            &[("fill", "compute")][..],
+            &[("fill", "compute"), ("pointer", "wide")],
+            &[("fill", "compute"), ("position", "depth")],
+            &[("fill", "raster"), ("position", "depth")],
+            &[("fill", "raster"), ("pointer", "wide")],
+            &[("fill", "raster")],
+        ] {
+            let db = psnr(&dedup, &list_image(&stage, &settings, sets));
+            println!("{samples} samples: {sets:?}: {db:.2} dB to deferred-dedup");
+            let least_db =
+                if sets.contains(&("position", "depth")) || sets.len() == 1 && sets[0].1 == "raster" {
+                    40.0
+                } else {
+                    45.0
+                };
+            assert!(db >= least_db, "{samples} samples: {sets:?}: {db:.2} dB to deferred-dedup");
+        }
+    }
+}
+
+/// With blocks for one sample alone the image is that of one sample.
+#[test]
+fn without_dynamic_blocks_it_is_the_image_of_one_sample() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=30000");
+    let settings = stage.settings((320, 180), 100);
+    let one = stage.image(find("forward").unwrap(), &settings);
+    for samples in std::iter::once(1).chain(counts(&gpu)) {
+        let db =
+            psnr(&one, &list_image(&stage, &Settings { samples, ..settings.clone() }, &[("blocks", "0")]));
+        println!("{samples} samples, no dynamic blocks: {db:.2} dB to one sample");
+        assert!(db >= 50.0, "{samples} samples: {db:.2} dB to one sample");
+    }
+}
+
+/// A bound on blocks that is too small drops samples, says how many, and leaves an image between one sample and all.
+#[test]
+fn a_bound_on_blocks_is_told() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=30000");
+    let list = find("gbuffer-list").unwrap();
+    for samples in counts(&gpu) {
+        let settings = Settings { samples, ..stage.settings((320, 180), 100) };
+        let all = list_image(&stage, &settings, &[]);
+        for fill in ["compute", "raster"] {
+            let mut last_db = 0.0;
+            for blocks in ["100", "10000", "100000"] {
+                let sets = [("fill", fill), ("blocks", blocks)];
+                let mut prepared = stage.prepare_with(list, &settings, &params(list, &sets));
+                let db = psnr(&all, &image_of(&mut prepared)).min(99.0);
+                let counter = prepared.counters().unwrap_or_else(|e| panic!("{e}")).remove(0);
+                println!("{samples} samples: {sets:?}: {db:.2} dB to all, {counter:?}");
+                assert_eq!(counter.dropped > 0, counter.needed > counter.capacity, "{counter:?}");
+                assert!(
+                    db > last_db,
+                    "{samples} samples: {sets:?}: {db:.2} dB with more blocks, {last_db:.2} before"
+                );
+                last_db = db;
+            }
+            assert!(last_db > 50.0, "{samples} samples, {fill}: {last_db:.2} dB with room for all");
+        }
+    }
+}
+
+/// Each filter stores fewer samples, and none turns the image into another.
+#[test]
+fn filters_store_fewer_samples() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=30000");
+    let list = find("gbuffer-list").unwrap();
+    for samples in counts(&gpu) {
+        let settings = Settings { samples, ..stage.settings((320, 180), 100) };
+        let one =
+            psnr(&list_image(&stage, &settings, &[]), &list_image(&stage, &settings, &[("blocks", "0")]));
+        let all = list_image(&stage, &settings, &[]);
+        let needed = |sets: &[(&str, &str)]| {
+            let mut prepared = stage.prepare_with(list, &settings, &params(list, sets));
+            let db = psnr(&all, &image_of(&mut prepared));
+            let counter = prepared.counters().unwrap_or_else(|e| panic!("{e}")).remove(0);
+            println!("{samples} samples: {sets:?}: {} blocks, {db:.2} dB to all", counter.needed);
+            assert!(db > one - 1.0, "{sets:?}: {db:.2} dB to all, one sample {one:.2}");
+            assert_eq!(counter.dropped, 0, "{counter:?}");
+            counter.needed
+        };
+        let without = needed(&[]);
+        for fill in ["compute", "raster"] {
+            for filter in ["ellipse", "rectangle", "depth", "objects", "depth-edges", "ellipse+depth"] {
+                let sets = [("fill", fill), ("filter", filter), ("depth-threshold", "12"), ("objects", "*")];
+                assert!(needed(&sets) < without, "{sets:?} stores as much as no filter");
+            }
+        }
+        let inside = needed(&[("filter", "ellipse")]);
+        let outside = needed(&[("filter", "ellipse"), ("region", "outside")]);
+        assert_eq!(inside + outside, without, "the two sides of a region are the whole");
+        assert!(needed(&[("filter", "edges")]) < without);
+    }
+}
