@@ -17,7 +17,7 @@ fn counts(device: &gpu::Device) -> Vec<u32> {
 /// Parameters that change how a technique works: of each group one, where the technique has it.
 const COMPARED: &[&[(&str, &str)]] = &[
     &[("lights", "all"), ("lights", "tiled")],
-    &[("fill", "compute"), ("fill", "raster"), ("visibility", "compute")],
+    &[("visibility", "raster"), ("fill", "raster"), ("visibility", "compute")],
 ];
 
 /// A technique's parameters from `key=value` words.
@@ -147,7 +147,7 @@ fn lists_equal_the_deduplicated_samples() {
         let settings = Settings { samples, ..stage.settings((320, 180), 100) };
         let dedup = stage.image(find("deferred-dedup").unwrap(), &settings);
         for sets in [
-            &[("fill", "compute")][..],
+            &[("visibility", "raster")][..],
             &[("fill", "compute"), ("pointer", "wide")],
             &[("fill", "compute"), ("position", "depth")],
             &[("visibility", "compute")],

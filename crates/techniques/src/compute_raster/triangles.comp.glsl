@@ -1,7 +1,7 @@
-// Rasterises small triangles, a thread each, and lists the others. A group takes one draw of at most 1,024 triangles.
+// Rasterises small triangles, a thread each, and lists the others. Eight groups share a draw of at most 1,024 triangles.
 //
-// In: the scene, draw commands. Out: SampleKeys; LargeTriangles: place in the order of draws. Dispatch: one group a draw of
-// a bucket. ALPHA_MASK tests the alpha of masked surfaces.
+// In: the scene, draw commands. Out: SampleKeys; LargeTriangles: place in the order of draws. Dispatch: draws of a bucket
+// x 8. ALPHA_MASK tests the alpha of masked surfaces.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "compute_raster/raster.glsl"
@@ -23,8 +23,9 @@ layout(push_constant, scalar) uniform Push {
     uint first_command;
 };
 
-// Longer loops of one thread cost more than a group's turn at the triangle. 32-bit edge functions hold up to 64 pixels.
-const int SMALL_PX = 16;
+// Side of the box of a small triangle, pixels: longer loops of one thread cost more than a group's turn at the triangle.
+// 32-bit edge functions hold up to 64 pixels.
+layout(constant_id = 11) const uint SMALL_PX = 16u;
 
 void rasterize_small(ScreenTriangle t, ivec2 first, ivec2 last, uint order, uint draw) {
     DepthPlane plane = depth_plane(t);
@@ -60,34 +61,36 @@ void main() {
     uint command = first_command + gl_WorkGroupID.x;
     RasterDraw d = load_raster_draw(command);
     uint triangles = draw_commands[command * 5u] / 3u;
-    for (uint triangle = gl_LocalInvocationID.x; triangle < triangles; triangle += gl_WorkGroupSize.x) {
-        vec4 c0, c1, c2;
-        vertices_clip(d.data, triangle_vertices(triangle, d.data), c0, c1, c2);
-        bool crosses = before_near_plane(c0) || before_near_plane(c1) || before_near_plane(c2);
-        bool is_large = crosses;
-        ScreenTriangle t;
-        ivec2 first, last;
-        if (!crosses) {
-            if (!screen_triangle(d, c0, c1, c2, 0u, t)) {
-                continue;
-            }
-            pixel_box(t, first, last);
-            if (any(greaterThan(first, last))) {
-                continue;
-            }
-            ivec2 size = (max(t.p0, max(t.p1, t.p2)) - min(t.p0, min(t.p1, t.p2))) >> 8;
-            is_large = max(size.x, size.y) >= SMALL_PX;
+    uint triangle = gl_WorkGroupID.y * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
+    if (triangle >= triangles) {
+        return;
+    }
+    vec4 c0, c1, c2;
+    vertices_clip(d.data, triangle_vertices(triangle, d.data), c0, c1, c2);
+    bool crosses = before_near_plane(c0) || before_near_plane(c1) || before_near_plane(c2);
+    bool is_large = crosses;
+    ScreenTriangle t;
+    ivec2 first, last;
+    if (!crosses) {
+        if (!screen_triangle(d, c0, c1, c2, 0u, t)) {
+            return;
         }
-        uint order = command << TRIANGLE_BITS | triangle;
-        if (!is_large) {
-            rasterize_small(t, first, last, order, d.draw);
+        pixel_box(t, first, last);
+        if (any(greaterThan(first, last))) {
+            return;
+        }
+        ivec2 size = (max(t.p0, max(t.p1, t.p2)) - min(t.p0, min(t.p1, t.p2))) >> 8;
+        is_large = max(size.x, size.y) >= int(SMALL_PX);
+    }
+    uint order = command << TRIANGLE_BITS | triangle;
+    if (!is_large) {
+        rasterize_small(t, first, last, order, d.draw);
+    } else {
+        uint place = atomicAdd(large_needed, 1u);
+        if (place < LARGE_CAPACITY) {
+            large_triangles[place] = order;
         } else {
-            uint place = atomicAdd(large_needed, 1u);
-            if (place < LARGE_CAPACITY) {
-                large_triangles[place] = order;
-            } else {
-                atomicAdd(large_dropped, 1u);
-            }
+            atomicAdd(large_dropped, 1u);
         }
     }
 }

@@ -29,9 +29,9 @@ const FILL: ParamInfo = ParamInfo {
 };
 const VISIBILITY: ParamInfo = ParamInfo {
     key: "visibility",
-    summary: "who finds the triangles that fill=compute reads: a raster pass, or rasterisation in compute, for devices whose raster part is small",
-    kind: ParamKind::Choice { values: &["raster", "compute"] },
-    default: "raster",
+    summary: "who finds the triangles that fill=compute reads: a raster pass, or rasterisation in compute; auto: compute on a GPU that has 64-bit buffer atomics",
+    kind: ParamKind::Choice { values: &["auto", "raster", "compute"] },
+    default: "auto",
 };
 const BLOCKS: ParamInfo = ParamInfo {
     key: "blocks",
@@ -77,6 +77,7 @@ static INFO: Info = Info {
         multisample::LIGHTS,
         FILL,
         VISIBILITY,
+        compute_raster::SMALL,
         BLOCKS,
         POINTER,
         POSITION,
@@ -213,7 +214,10 @@ impl Technique for GbufferList {
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let layout = Layout::new(frame)?;
         let by_raster = frame.params.text(&INFO, FILL.key) == "raster";
-        let keys = frame.params.text(&INFO, VISIBILITY.key) == "compute";
+        let keys = match frame.params.text(&INFO, VISIBILITY.key) {
+            "auto" => compute_raster::is_faster(frame),
+            text => text == "compute",
+        };
         let lists = match (by_raster, keys) {
             (true, _) => fill_by_raster(graph, frame, &layout)?,
             (false, true) => fill_from_keys(graph, frame, &layout)?,
@@ -308,7 +312,8 @@ fn fill_from_keys(graph: &mut Graph, frame: &Frame<'_>, layout: &Layout) -> Resu
                     .to_owned(),
         });
     }
-    let keys = compute_raster::rasterize(graph, frame, INFO.id, layout.samples)?;
+    let small_px = frame.params.number(&INFO, compute_raster::SMALL.key) as u32;
+    let keys = compute_raster::rasterize(graph, frame, INFO.id, layout.samples, small_px)?;
     let (blocks, count, flagged) = empty_lists(graph, frame, layout)?;
     let mut pass = frame.compute(graph, "gbuffer-list/fill", &frame.shader("gbuffer_list/fill.comp#keys")?);
     for (name, value) in build_constants(frame, layout) {
