@@ -84,7 +84,8 @@ fn bad_usage_is_one_line_and_exit_code_2() {
     refused(&["compare", "--shadows", "pcss"], 2, &["--shadows", "pcss"]);
     refused(&["compare", "--indirect", "rsm"], 2, &["--indirect", "rsm"]);
     refused(&["compare", "--view", "normals"], 2, &["--view", "normals", "final"]);
-    refused(&["bench", "everything"], 2, &["everything", "speed"]);
+    refused(&["bench", "everything"], 2, &["everything", "speed", "msaa-table1"]);
+    refused(&["bench", "speed", "--scale", "0"], 2, &["--scale", "0", "at most 1"]);
     refused(&["completions", "csh"], 2, &["csh"]);
     refused(&["render", "-o", "a.png"], 2, &["--technique"]);
     refused(&["render", "--technique", "forward", "-o", "a.jpg"], 2, &["a.jpg", ".png or .exr"]);
@@ -281,6 +282,56 @@ fn samples_that_the_device_lacks_are_told() {
         2,
         &["--samples", lacking, "one of: 1"],
     );
+}
+
+#[test]
+fn bench_msaa_table1_has_all_cells_beside_the_papers() {
+    if !has_device() {
+        return;
+    }
+    let folder = folder();
+    let arguments = ["bench", "msaa-table1", "--scale", "0.1", "--report", "r", "--json", "-"];
+    let output = run_in(folder.path(), &arguments);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let found = json(&output);
+    assert_eq!((&found["schema"], &found["experiment"]), (&1.into(), &"msaa-table1".into()));
+    let rows = found["rows"].as_array().expect("a list");
+    let samples: Vec<_> = rows.iter().map(|row| row["settings"]["samples"].as_u64()).collect();
+    assert_eq!(samples, [Some(1), Some(4), Some(8)]);
+    let cells: Vec<&Value> = rows.iter().flat_map(|row| row["cells"].as_array().expect("a list")).collect();
+    let paper = [
+        ("none", [23.73, 7.91, 31.64]),
+        ("MSAA 4x", [94.92, 31.64, 126.56]),
+        ("MSAA 8x", [189.84, 63.28, 253.12]),
+        ("list 4x min", [27.69, 31.64, 59.33]),
+        ("list 4x max", [110.74, 31.64, 142.38]),
+        ("list 8x min", [27.69, 63.28, 90.97]),
+        ("list 8x max", [221.48, 63.28, 284.76]),
+    ];
+    for (column, figures) in paper {
+        for (row, figure) in ["g-buffer", "z-buffer", "total"].into_iter().zip(figures) {
+            let cell = cells
+                .iter()
+                .find(|cell| cell["column"] == column && cell["row"] == row)
+                .unwrap_or_else(|| panic!("no cell {column} {row}"));
+            let paper_mib = cell["paper_mib"].as_f64().expect("a number");
+            assert!((paper_mib - figure * 0.01).abs() < 1e-6, "{cell}");
+            match cell["status"].as_str() {
+                // A tenth of the size: a page more or less weighs a hundred times as much.
+                Some("ok") => {
+                    let off = cell["deviation_without_granularity_percent"].as_f64().expect("a number");
+                    assert!(off.abs() < 3.0, "{cell}");
+                    assert!(cell["bytes"].as_u64() >= cell["layout_bytes"].as_u64(), "{cell}");
+                }
+                _ => assert!(cell["status"] == "unavailable" && cell["reason"].is_string(), "{cell}"),
+            }
+        }
+    }
+    for used in ["list 4x used", "default list 4x used"] {
+        assert!(cells.iter().any(|cell| cell["column"] == used), "no cell {used}");
+    }
+    let html = fs::read_to_string(folder.path().join("r/report.html")).expect("written");
+    assert!(html.contains("MSAA 4x") && html.contains("G-buffer"));
 }
 
 /// The folder of reference scenes, beside the repository.
