@@ -277,6 +277,17 @@ pub enum Post {
     Sraa,
 }
 
+impl From<Post> for afterlight_techniques::Post {
+    fn from(post: Post) -> Self {
+        match post {
+            Post::None => Self::None,
+            Post::Fxaa => Self::Fxaa,
+            Post::Smaa => Self::Smaa,
+            Post::Sraa => Self::Sraa,
+        }
+    }
+}
+
 /// `--shadows`
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Shadows {
@@ -302,8 +313,9 @@ impl CommonArgs {
                 format!("{expected} (nothing else is available in this version)"),
             ))
         };
-        if self.post != Post::None {
-            return not_yet("--post", &name_of(self.post), "none");
+        if self.post != Post::None && self.view != afterlight_techniques::view::FINAL {
+            let expected = "none with a debug view (its colours are values, which no filter may mix)";
+            return Err(Failure::option("--post", name_of(self.post), expected));
         }
         if self.shadows != Shadows::None {
             return not_yet("--shadows", &name_of(self.shadows), "none");
@@ -380,14 +392,17 @@ mod tests {
 
     #[test]
     fn what_is_not_there_yet_is_refused() {
-        for option in
-            [["--post", "fxaa"], ["--shadows", "map"], ["--indirect", "rsm"], ["--shadow-map-size", "512"]]
-        {
+        for option in [["--shadows", "map"], ["--indirect", "rsm"], ["--shadow-map-size", "512"]] {
             let failure = compare(&option).common.check().expect_err("is refused");
             let line = failure.lines().remove(0);
             assert_eq!(failure.code(), 2);
             assert!(line.starts_with(option[0]) && line.contains("expected"), "{line}");
         }
+        for post in ["none", "fxaa", "smaa", "sraa"] {
+            assert!(compare(&["--post", post]).common.check().is_ok(), "{post}");
+        }
+        let failure = compare(&["--post", "fxaa", "--view", "edges"]).common.check().expect_err("is refused");
+        assert!(failure.lines()[0].starts_with("--post: found fxaa, expected none"));
         assert!(compare(&["--camera", "-1,0,0,0,0,0,60"]).common.check().is_ok());
     }
 }

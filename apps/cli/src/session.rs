@@ -8,7 +8,7 @@ use afterlight_graph::gpu::{Device, DeviceOptions};
 use afterlight_measure::{DeviceRecord, SceneRecord, SettingsRecord};
 use afterlight_scene::{Camera, LightKind, LoadOptions, Projection, Scene, camera, lights, load_source};
 use afterlight_techniques::cost::Workload;
-use afterlight_techniques::{Params, Renderer, SceneGpu, Settings, Technique, registry};
+use afterlight_techniques::{Params, Post, Renderer, SceneGpu, Settings, Technique, registry};
 
 use crate::args::CommonArgs;
 use crate::failure::Failure;
@@ -190,6 +190,7 @@ impl Session {
             lights,
             environment: scene.environment,
             keep_hdr,
+            post: common.post.into(),
             view: common.view.clone(),
             ..Settings::for_scene(&scene, common.width, common.height)
         };
@@ -238,6 +239,7 @@ impl Session {
             frames,
             camera: self.camera.clone(),
             reference: reference.to_owned(),
+            post: Post::from(common.post).name().to_owned(),
             light_seed: (common.lights > 0).then_some(common.light_seed),
             version: env!("CARGO_PKG_VERSION").to_owned(),
         }

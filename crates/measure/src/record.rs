@@ -90,10 +90,18 @@ pub struct SettingsRecord {
     pub camera: String,
     /// Technique that images are compared to.
     pub reference: String,
+    /// Anti-aliasing after shading: `none`, `fxaa`, `smaa` or `sraa`.
+    #[serde(default = "no_post")]
+    pub post: String,
     /// Seed of the lights; none where the scene's own lights shade.
     pub light_seed: Option<u64>,
     /// Version of the program.
     pub version: String,
+}
+
+/// What records from before there was a choice had.
+fn no_post() -> String {
+    "none".to_owned()
 }
 
 /// How a technique's run ended.
@@ -253,6 +261,7 @@ mod tests {
                 frames: 3,
                 camera: "0".into(),
                 reference: "forward".into(),
+                post: "smaa".into(),
                 light_seed: Some(1),
                 version: "0".into(),
             },
@@ -283,6 +292,14 @@ mod tests {
     fn json_reads_back() {
         let text = serde_json::to_string(&run()).expect("is JSON");
         assert_eq!(serde_json::from_str::<Run>(&text).expect("reads"), run());
+    }
+
+    #[test]
+    fn a_record_from_before_post_reads() {
+        let mut json = serde_json::to_value(run()).expect("is JSON");
+        json["settings"].as_object_mut().expect("is an object").remove("post");
+        let old: Run = serde_json::from_value(json).expect("reads");
+        assert_eq!(old.settings.post, "none");
     }
 
     #[test]

@@ -53,6 +53,7 @@ fn section(section: &Section<'_>) -> Markup {
                 (grouped(run.scene.draws)) " draws, " (grouped(run.scene.lights)) " lights; "
                 (settings.width) "×" (settings.height) ", "
                 (settings.samples) @if settings.samples == 1 { " sample" } @else { " samples" } " a pixel, "
+                @if settings.post != "none" { (settings.post) ", " }
                 "median of " (settings.frames) @if settings.frames == 1 { " frame" } @else { " frames" }
                 "; images compared to " code { (settings.reference) }
             }

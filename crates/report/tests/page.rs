@@ -33,6 +33,7 @@ fn run() -> Run {
             frames: 3,
             camera: "front".into(),
             reference: "forward".into(),
+            post: "smaa".into(),
             light_seed: Some(1),
             version: "0.1.0".into(),
         },

@@ -39,7 +39,9 @@ impl Demand {
     /// Reads the last frame's count.
     pub fn read(&self, executor: &Executor) -> Result<Counter, TechniqueError> {
         let bytes = executor.read_buffer(self.resource)?;
-        let word = |i: usize| bytes.get(4 * i..4 * i + 4).map_or(0, |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
+        let word = |i: usize| {
+            bytes.get(4 * i..4 * i + 4).map_or(0, |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]))
+        };
         Ok(Counter {
             name: self.name.to_owned(),
             needed: word(0),
@@ -69,14 +71,16 @@ impl Capacities {
     /// Capacities for another recording, or `None` where those of this one fit what was counted.
     pub fn next(&self, counters: &[Counter]) -> Option<Self> {
         let fits = |c: &Counter| {
-            c.fixed || c.needed <= c.capacity && (c.capacity - c.needed <= SLACK || c.capacity / 2 <= c.needed)
+            c.fixed
+                || c.needed <= c.capacity && (c.capacity - c.needed <= SLACK || c.capacity / 2 <= c.needed)
         };
         if counters.iter().all(fits) {
             return None;
         }
         // An eighth more than needed: the next frame of a moving view needs a little more or less.
         let room = |c: &Counter| c.needed.saturating_add(c.needed / 8).saturating_add(SLACK / 8);
-        let known = counters.iter().map(|c| (c.name.clone(), if fits(c) { c.capacity } else { room(c) })).collect();
+        let known =
+            counters.iter().map(|c| (c.name.clone(), if fits(c) { c.capacity } else { room(c) })).collect();
         Some(Self { known, demands: RefCell::default() })
     }
 }
@@ -90,7 +94,14 @@ impl Frame<'_> {
 
     /// Has a list's counter read after each frame: two words, elements asked for and what was dropped. Where `fixed` is
     /// false, a frame that asks for more than `capacity` is recorded again with room.
-    pub fn watch(&self, graph: &mut Graph, name: &'static str, counter: &BufferHandle, capacity: u32, fixed: bool) {
+    pub fn watch(
+        &self,
+        graph: &mut Graph,
+        name: &'static str,
+        counter: &BufferHandle,
+        capacity: u32,
+        fixed: bool,
+    ) {
         let resource = graph.keep(counter);
         self.capacities.demands.borrow_mut().push(Demand { name, resource, capacity, fixed });
     }

@@ -267,7 +267,12 @@ mod tests {
         let four = Workload { shading_samples: 4.0, expected_samples: 1.5, ..w };
         assert_eq!(
             deferred_msaa(&four),
-            Cost { cmd: 13.0, proc: 100.0 + 24.0 + 80.0 * 1.0, mem: 640.0, band: 200.0 + 1600.0 + 24.0 + 800.0 + 480.0 }
+            Cost {
+                cmd: 13.0,
+                proc: 100.0 + 24.0 + 80.0 * 1.0,
+                mem: 640.0,
+                band: 200.0 + 1600.0 + 24.0 + 800.0 + 480.0
+            }
         );
         assert_eq!(
             deferred_dedup(&four),
@@ -275,7 +280,12 @@ mod tests {
         );
         assert_eq!(
             gbuffer_list(&four, true),
-            Cost { cmd: 10.0, proc: 130.0, mem: 320.0 + 210.0, band: 200.0 + 400.0 + 40.0 * 15.5 + 420.0 + 210.0 }
+            Cost {
+                cmd: 10.0,
+                proc: 130.0,
+                mem: 320.0 + 210.0,
+                band: 200.0 + 400.0 + 40.0 * 15.5 + 420.0 + 210.0
+            }
         );
         assert_eq!(
             visibility_buffer(&w),

@@ -6,7 +6,10 @@ use afterlight_graph::{
 };
 use afterlight_shader::Shader;
 
-use crate::{SHADERS, capacity::Capacities, error::TechniqueError, light_list::LightList, params::Params, scene_gpu::SceneGpu};
+use crate::{
+    SHADERS, capacity::Capacities, error::TechniqueError, light_list::LightList, params::Params,
+    scene_gpu::SceneGpu,
+};
 
 /// A frame to be recorded: the scene on the device, its buffers imported into the graph, sizes and parameters.
 pub struct Frame<'a> {
@@ -113,7 +116,12 @@ impl Frame<'_> {
     ///
     /// # Errors
     /// The device.
-    pub fn table(&self, graph: &mut Graph, name: &str, words: &[u32]) -> Result<BufferHandle, TechniqueError> {
+    pub fn table(
+        &self,
+        graph: &mut Graph,
+        name: &str,
+        words: &[u32],
+    ) -> Result<BufferHandle, TechniqueError> {
         let words = if words.is_empty() { &[0] } else { words };
         let buffer = self.device.create_buffer(&gpu::BufferDesc {
             name,

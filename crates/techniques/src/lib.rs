@@ -3,7 +3,7 @@
 //! A technique answers four questions (what a surface leaves behind, how lights find it, where shading runs, how samples
 //! become pixels) and is one folder: `mod.rs` with its `TECHNIQUE`, its shaders, `variants.txt` that lists their variants,
 //! a README. The build collects the folders into [`registry`]. Stages that several techniques share stand beside them:
-//! [`geometry`], [`gbuffer`], [`volumes`], [`present`].
+//! [`geometry`], [`gbuffer`], [`volumes`], [`present`], [`post`].
 //!
 //! ```no_run
 //! use afterlight_techniques::{Params, Renderer, Settings, find, graph::gpu};
@@ -31,11 +31,12 @@ pub mod geometry;
 mod light_list;
 pub mod multisample;
 mod params;
-
+pub mod post;
 pub mod present;
 mod radiance_target;
 mod renderer;
 mod scene_gpu;
+pub mod supersample;
 mod technique;
 mod textures;
 pub mod view;
@@ -46,6 +47,7 @@ pub use error::TechniqueError;
 pub use frame::Frame;
 pub use light_list::LightList;
 pub use params::{ParamInfo, ParamKind, Params};
+pub use post::Post;
 pub use capacity::Counter;
 pub use renderer::{Prepared, Renderer, Settings};
 pub use scene_gpu::SceneGpu;

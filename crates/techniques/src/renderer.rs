@@ -17,7 +17,7 @@ use crate::{
     frame::{Frame, FrameBuffers},
     light_list::LightList,
     params::Params,
-    present,
+    post::{self, Post},
     scene_gpu::{SceneGpu, upload_slice},
     technique::Technique,
     view, volumes,
@@ -45,6 +45,8 @@ pub struct Settings {
     pub view: String,
     /// Keeps the linear radiance after a frame, for [`Prepared::hdr_rgba`]; its memory is then not reused.
     pub keep_hdr: bool,
+    /// Anti-aliasing after shading.
+    pub post: Post,
 }
 
 impl Settings {
@@ -60,6 +62,7 @@ impl Settings {
             environment: scene.environment,
             view: view::FINAL.to_owned(),
             keep_hdr: false,
+            post: Post::None,
         }
     }
 }
@@ -178,7 +181,8 @@ impl Renderer {
 
         let mut capacities = Capacities::default();
         loop {
-            let mut prepared = self.record(technique, params, &view, &draws, &constants, &capacities, &also)?;
+            let mut prepared =
+                self.record(technique, params, &view, &draws, &constants, &capacities, &also)?;
             if !capacities.is_watched() {
                 return Ok(prepared);
             }
@@ -214,7 +218,10 @@ impl Renderer {
             return Err(TechniqueError::UnknownView {
                 technique: info.id,
                 found: view.clone(),
-                known: std::iter::once(view::FINAL).chain(info.views.iter().copied()).collect::<Vec<_>>().join(", "),
+                known: std::iter::once(view::FINAL)
+                    .chain(info.views.iter().copied())
+                    .collect::<Vec<_>>()
+                    .join(", "),
             });
         }
         Ok(())
@@ -252,7 +259,7 @@ impl Renderer {
         let hdr = technique.record(&mut graph, &frame)?;
         also(&mut graph, &hdr);
         let hdr_id = settings.keep_hdr.then(|| graph.keep(&hdr));
-        let final_color = present::present(&mut graph, &frame, &hdr)?;
+        let final_color = post::finish(&self.device, &mut graph, &frame, &hdr, settings.post)?;
         let final_id = graph.keep(&final_color);
         let plan = graph.plan(&self.device)?;
         let executor = Executor::new(&self.device, plan)?;
@@ -334,10 +341,14 @@ impl Prepared {
     /// # Errors
     /// The device.
     pub fn hdr_rgba(&mut self) -> Result<Option<Vec<f32>>, TechniqueError> {
-        let Some(hdr) = self.hdr else { return Ok(None) };
-        let bytes = self.executor.read_image(hdr)?;
+        let Some(bytes) = self.hdr_bytes()? else { return Ok(None) };
         let halves = bytes.chunks_exact(2).map(|b| half::f16::from_le_bytes([b[0], b[1]]).to_f32());
         Ok(Some(halves.collect()))
+    }
+
+    /// The last frame's linear radiance as it lies on the device, RGBA16F.
+    pub(crate) fn hdr_bytes(&mut self) -> Result<Option<Vec<u8>>, TechniqueError> {
+        Ok(self.hdr.map(|hdr| self.executor.read_image(hdr)).transpose()?)
     }
 
     /// What the last frame counted of everything that can overflow: what it needed, what there was, what was dropped.

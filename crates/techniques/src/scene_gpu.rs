@@ -265,7 +265,8 @@ impl DrawTable {
                 "{blended} draws with alpha blending are left out: no opaque technique shows them"
             ));
         }
-        let mut table = Self { data: Vec::new(), infos: Vec::new(), names: Vec::new(), bucket_first: [0; BUCKETS + 1] };
+        let mut table =
+            Self { data: Vec::new(), infos: Vec::new(), names: Vec::new(), bucket_first: [0; BUCKETS + 1] };
         for (bucket, draws) in by_bucket.into_iter().enumerate() {
             for (data, info, names) in draws {
                 table.data.push(data);

@@ -2,12 +2,7 @@
 
 mod common;
 
-use afterlight_techniques::{
-    Params, Settings, Technique, find,
-    graph::gpu,
-    registry,
-    scene::Camera,
-};
+use afterlight_techniques::{Params, Settings, Technique, find, graph::gpu, registry, scene::Camera};
 use common::{Stage, image_of, psnr};
 use glam::Vec3;
 
@@ -60,7 +55,10 @@ fn all_agree(stage: &Stage, settings: &Settings, what: &str, runs: usize) {
             for run in 0..runs {
                 let db = psnr(&reference, &image_of(&mut prepared));
                 println!("{what}, {samples} samples: {name} run {run}: {db:.2} dB");
-                assert!(db >= MIN_PSNR_DB, "{what}, {samples} samples: {name} run {run}: {db:.2} dB to forward");
+                assert!(
+                    db >= MIN_PSNR_DB,
+                    "{what}, {samples} samples: {name} run {run}: {db:.2} dB to forward"
+                );
             }
         }
     }
@@ -118,11 +116,15 @@ fn pixels_not_black(image: &afterlight_image::Rgba8Image) -> usize {
 #[test]
 fn weights_sum_to_the_samples() {
     let gpu = afterlight_testkit::gpu();
-    for source in ["builtin:intersect", "builtin:colonnade?triangles=30000&texture=64", "builtin:edge", "builtin:spheres"] {
+    for source in [
+        "builtin:intersect",
+        "builtin:colonnade?triangles=30000&texture=64",
+        "builtin:edge",
+        "builtin:spheres",
+    ] {
         let stage = Stage::new(&gpu, source);
         for samples in counts(&gpu) {
-            let settings =
-                Settings { samples, view: "weights".to_owned(), ..stage.settings((161, 91), 2) };
+            let settings = Settings { samples, view: "weights".to_owned(), ..stage.settings((161, 91), 2) };
             for (technique, params, name) in variants() {
                 if !technique.info().views.contains(&"weights") {
                     continue;
@@ -147,34 +149,97 @@ fn lists_equal_the_deduplicated_samples() {
             &[("fill", "compute")][..],
             &[("fill", "compute"), ("pointer", "wide")],
             &[("fill", "compute"), ("position", "depth")],
-            &[("fill", "raster"), ("position", "distance")],
+            &[("fill", "raster"), ("position", "depth")],
             &[("fill", "raster"), ("pointer", "wide")],
             &[("fill", "raster")],
         ] {
             let db = psnr(&dedup, &list_image(&stage, &settings, sets));
             println!("{samples} samples: {sets:?}: {db:.2} dB to deferred-dedup");
-            let least_db = if sets.contains(&("position", "depth")) || sets.len() == 1 && sets[0].1 == "raster" { 40.0 } else { 45.0 };
+            let least_db =
+                if sets.contains(&("position", "depth")) || sets.len() == 1 && sets[0].1 == "raster" {
+                    40.0
+                } else {
+                    45.0
+                };
             assert!(db >= least_db, "{samples} samples: {sets:?}: {db:.2} dB to deferred-dedup");
         }
     }
 }
 
-/// With blocks for one sample alone the image is that of one sample, and what was dropped is told.
+/// With blocks for one sample alone the image is that of one sample.
 #[test]
 fn without_dynamic_blocks_it_is_the_image_of_one_sample() {
     let gpu = afterlight_testkit::gpu();
     let stage = Stage::new(&gpu, "builtin:colonnade?triangles=30000");
-    let one = stage.image(find("visibility").unwrap(), &stage.settings((320, 180), 100));
+    let settings = stage.settings((320, 180), 100);
+    let one = stage.image(find("forward").unwrap(), &settings);
+    for samples in std::iter::once(1).chain(counts(&gpu)) {
+        let db =
+            psnr(&one, &list_image(&stage, &Settings { samples, ..settings.clone() }, &[("blocks", "0")]));
+        println!("{samples} samples, no dynamic blocks: {db:.2} dB to one sample");
+        assert!(db >= 50.0, "{samples} samples: {db:.2} dB to one sample");
+    }
+}
+
+/// A bound on blocks that is too small drops samples, says how many, and leaves an image between one sample and all.
+#[test]
+fn a_bound_on_blocks_is_told() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=30000");
     let list = find("gbuffer-list").unwrap();
     for samples in counts(&gpu) {
         let settings = Settings { samples, ..stage.settings((320, 180), 100) };
-        for (sets, least_db) in [(&[("blocks", "0")][..], 30.0)] {
-            let mut prepared = stage.prepare_with(list, &settings, &params(list, sets));
-            let db = psnr(&one, &image_of(&mut prepared));
-            let counters = prepared.counters().unwrap_or_else(|e| panic!("{e}"));
-            println!("{samples} samples: {sets:?}: {db:.2} dB to one sample, {counters:?}");
-            assert!(counters[0].dropped > 0 && counters[0].capacity == 0, "{counters:?}");
-            assert!(db >= least_db, "{samples} samples: {sets:?}: {db:.2} dB to one sample");
+        let all = list_image(&stage, &settings, &[]);
+        for fill in ["compute", "raster"] {
+            let mut last_db = 0.0;
+            for blocks in ["100", "10000", "100000"] {
+                let sets = [("fill", fill), ("blocks", blocks)];
+                let mut prepared = stage.prepare_with(list, &settings, &params(list, &sets));
+                let db = psnr(&all, &image_of(&mut prepared)).min(99.0);
+                let counter = prepared.counters().unwrap_or_else(|e| panic!("{e}")).remove(0);
+                println!("{samples} samples: {sets:?}: {db:.2} dB to all, {counter:?}");
+                assert_eq!(counter.dropped > 0, counter.needed > counter.capacity, "{counter:?}");
+                assert!(
+                    db > last_db,
+                    "{samples} samples: {sets:?}: {db:.2} dB with more blocks, {last_db:.2} before"
+                );
+                last_db = db;
+            }
+            assert!(last_db > 50.0, "{samples} samples, {fill}: {last_db:.2} dB with room for all");
         }
+    }
+}
+
+/// Each filter stores fewer samples, and none turns the image into another.
+#[test]
+fn filters_store_fewer_samples() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=30000");
+    let list = find("gbuffer-list").unwrap();
+    for samples in counts(&gpu) {
+        let settings = Settings { samples, ..stage.settings((320, 180), 100) };
+        let one =
+            psnr(&list_image(&stage, &settings, &[]), &list_image(&stage, &settings, &[("blocks", "0")]));
+        let all = list_image(&stage, &settings, &[]);
+        let needed = |sets: &[(&str, &str)]| {
+            let mut prepared = stage.prepare_with(list, &settings, &params(list, sets));
+            let db = psnr(&all, &image_of(&mut prepared));
+            let counter = prepared.counters().unwrap_or_else(|e| panic!("{e}")).remove(0);
+            println!("{samples} samples: {sets:?}: {} blocks, {db:.2} dB to all", counter.needed);
+            assert!(db > one - 1.0, "{sets:?}: {db:.2} dB to all, one sample {one:.2}");
+            assert_eq!(counter.dropped, 0, "{counter:?}");
+            counter.needed
+        };
+        let without = needed(&[]);
+        for fill in ["compute", "raster"] {
+            for filter in ["ellipse", "rectangle", "depth", "objects", "depth-edges", "ellipse+depth"] {
+                let sets = [("fill", fill), ("filter", filter), ("depth-threshold", "12"), ("objects", "*")];
+                assert!(needed(&sets) < without, "{sets:?} stores as much as no filter");
+            }
+        }
+        let inside = needed(&[("filter", "ellipse")]);
+        let outside = needed(&[("filter", "ellipse"), ("region", "outside")]);
+        assert_eq!(inside + outside, without, "the two sides of a region are the whole");
+        assert!(needed(&[("filter", "edges")]) < without);
     }
 }

@@ -33,6 +33,11 @@ pub fn run(args: &RenderArgs) -> Result<(), Failure> {
     let common = &args.common;
     common.check()?;
     let format = format_of(&args.output)?;
+    let post = afterlight_techniques::Post::from(common.post);
+    if format == Format::Exr && post != afterlight_techniques::Post::None {
+        let expected = "none for linear radiance (the filters work on the image that a .png shows)";
+        return Err(Failure::option("--post", post.name(), expected));
+    }
     output::check_file(&args.output)?;
     if let Some(stats) = &args.stats {
         output::check_file(stats)?;

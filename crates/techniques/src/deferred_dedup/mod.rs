@@ -55,6 +55,8 @@ impl Technique for DeferredDedup {
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let filled = multisample::fill_dedup(graph, frame, "deferred-dedup")?;
         let lights = frame.params.text(&INFO, "lights");
-        multisample::shade(graph, frame, "deferred-dedup", "dedup", lights, |pass| filled.bind(pass))
+        multisample::shade(graph, frame, "deferred-dedup", ("dedup", frame.samples), lights, |pass| {
+            filled.bind(pass)
+        })
     }
 }

@@ -70,7 +70,9 @@ impl Technique for DeferredMsaa {
         let filled = multisample::fill_samples(graph, frame, "deferred-msaa")?;
         match frame.params.text(&INFO, "lights") {
             "tiled" => {
-                multisample::shade(graph, frame, "deferred-msaa", "msaa", "tiled", |pass| filled.bind(pass))
+                multisample::shade(graph, frame, "deferred-msaa", ("msaa", frame.samples), "tiled", |pass| {
+                    filled.bind(pass);
+                })
             }
             _ => shade_by_stencil(graph, frame, &filled),
         }
@@ -84,13 +86,13 @@ fn shade_by_stencil(
     filled: &SampleBuffer,
 ) -> Result<ImageHandle, TechniqueError> {
     let stencil = graph.image("deferred-msaa/stencil", frame.image_info(frame.depth_stencil_format()));
-    let radiance =
-        graph.image("deferred-msaa/radiance", frame.image_info(vk::Format::R16G16B16A16_SFLOAT));
+    let radiance = graph.image("deferred-msaa/radiance", frame.image_info(vk::Format::R16G16B16A16_SFLOAT));
     let samples = [("SAMPLES", frame.samples)];
     let mark = multisample::full_screen(frame, "multisample/mark.frag", &samples)?.stencil(MARK);
     let shaded = |rate: &str| {
         let fragment = emission_variant(frame, &format!("multisample/shade.frag#{rate}"));
-        let state = multisample::full_screen(frame, &fragment, &multisample::shade_constants(frame))?;
+        let state =
+            multisample::full_screen(frame, &fragment, &multisample::shade_constants(frame, frame.samples))?;
         Ok::<_, TechniqueError>(state.stencil(MARKED).depth(DepthTest::OFF))
     };
     let (at_pixels, at_samples) = (shaded("pixel")?, shaded("sample")?);

@@ -58,6 +58,8 @@ impl Technique for DeferredSsaa {
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let filled = multisample::fill_samples(graph, frame, "deferred-ssaa")?;
         let lights = frame.params.text(&INFO, "lights");
-        multisample::shade(graph, frame, "deferred-ssaa", "ssaa", lights, |pass| filled.bind(pass))
+        multisample::shade(graph, frame, "deferred-ssaa", ("ssaa", frame.samples), lights, |pass| {
+            filled.bind(pass)
+        })
     }
 }

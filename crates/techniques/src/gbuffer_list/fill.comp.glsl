@@ -18,12 +18,12 @@
 #include "gbuffer_list/filter.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
-layout(set = 0, binding = 8) uniform texture2DMS ids;
+layout(set = 0, binding = 8) uniform SAMPLED_IMAGE ids;
 
 ivec2 pixel;
 
 uint sample_id(uint i) {
-    return packUnorm4x8(texelFetch(ids, pixel, int(i)));
+    return packUnorm4x8(FETCH_SAMPLE(ids, pixel, i));
 }
 
 // A triangle that shows in the pixel.
@@ -44,7 +44,7 @@ Visible take_triangle(inout uint mask) {
 }
 
 float sample_distance(uint i) {
-    return distance_from_depth(texelFetch(gbuffer_depth, pixel, int(i)).r);
+    return distance_from_depth(FETCH_SAMPLE(gbuffer_depth, pixel, i).r);
 }
 
 bool is_filtered(Visible v) {
@@ -118,7 +118,7 @@ bool surfaces_differ() {
         SurfacePoint point = triangle_point(v.id, ndc, material);
         // Where the surface shows, not at the centre, which it may not cover.
         uint i = uint(findLSB(v.samples));
-        vec3 shown_ws = position_from_depth(ndc_from_sample(pixel, i), texelFetch(gbuffer_depth, pixel, int(i)).r);
+        vec3 shown_ws = position_from_depth(ndc_from_sample(pixel, i), FETCH_SAMPLE(gbuffer_depth, pixel, i).r);
         float apart_m = abs(dot(normal, shown_ws - first.position_ws));
         if (material != first_material || dot(normal, unit_or_zero(point.normal_ws)) < 1.0 - EDGE_THRESHOLD
             || apart_m > 2.0 * pixel_m) {

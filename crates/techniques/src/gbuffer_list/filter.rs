@@ -31,14 +31,26 @@ pub(super) const REGION: ParamInfo = ParamInfo {
     default: "inside",
 };
 /// `left`
-pub(super) const LEFT: ParamInfo =
-    ParamInfo { key: "left", summary: "left edge of the region, percent of the width", kind: PERCENT, default: "20" };
+pub(super) const LEFT: ParamInfo = ParamInfo {
+    key: "left",
+    summary: "left edge of the region, percent of the width",
+    kind: PERCENT,
+    default: "20",
+};
 /// `top`
-pub(super) const TOP: ParamInfo =
-    ParamInfo { key: "top", summary: "upper edge of the region, percent of the height", kind: PERCENT, default: "15" };
+pub(super) const TOP: ParamInfo = ParamInfo {
+    key: "top",
+    summary: "upper edge of the region, percent of the height",
+    kind: PERCENT,
+    default: "15",
+};
 /// `right`
-pub(super) const RIGHT: ParamInfo =
-    ParamInfo { key: "right", summary: "right edge of the region, percent of the width", kind: PERCENT, default: "80" };
+pub(super) const RIGHT: ParamInfo = ParamInfo {
+    key: "right",
+    summary: "right edge of the region, percent of the width",
+    kind: PERCENT,
+    default: "80",
+};
 /// `bottom`
 pub(super) const BOTTOM: ParamInfo = ParamInfo {
     key: "bottom",
@@ -71,7 +83,12 @@ pub(super) const EDGE_THRESHOLD: ParamInfo = ParamInfo {
 /// Bits of the filters that are on.
 pub(super) fn bits(info: &Info, params: &Params) -> u32 {
     let text = params.text(info, FILTER.key);
-    WORDS.iter().enumerate().filter(|(_, word)| text.split('+').any(|w| w == **word)).map(|(i, _)| 1 << i).sum()
+    WORDS
+        .iter()
+        .enumerate()
+        .filter(|(_, word)| text.split('+').any(|w| w == **word))
+        .map(|(i, _)| 1 << i)
+        .sum()
 }
 
 /// Specialization constants of `filter.glsl`.
@@ -123,10 +140,14 @@ mod tests {
 
     #[test]
     fn patterns_match_whole_names() {
-        for (pattern, name) in [("tree", "tree"), ("tree*", "tree_07"), ("*leaf", "a leaf"), ("*a*b*", "xaybz"), ("*", "")] {
+        for (pattern, name) in
+            [("tree", "tree"), ("tree*", "tree_07"), ("*leaf", "a leaf"), ("*a*b*", "xaybz"), ("*", "")]
+        {
             assert!(matches(pattern, name), "{pattern} {name}");
         }
-        for (pattern, name) in [("tree", "trees"), ("tree*", "a tree"), ("*leaf", "leafs"), ("a*a", "a"), ("*b*a*", "ab")] {
+        for (pattern, name) in
+            [("tree", "trees"), ("tree*", "a tree"), ("*leaf", "leafs"), ("a*a", "a"), ("*b*a*", "ab")]
+        {
             assert!(!matches(pattern, name), "{pattern} {name}");
         }
     }

@@ -7,8 +7,8 @@ mod filter;
 use afterlight_graph::{BufferHandle, DepthTest, Graph, ImageHandle, Load, gpu::vk};
 
 use crate::{
-    Answers, AppendixA, Exactness, Frame, Info, MULTIPLE_SAMPLES, ParamInfo, ParamKind, Params, Source,
-    Technique, TechniqueError,
+    ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, ParamInfo, ParamKind, Params, Source, Technique,
+    TechniqueError,
     cost::{self, Cost, Workload},
     depth_prepass::FIRST_FRAGMENT,
     geometry::Surfaces,
@@ -84,7 +84,7 @@ static INFO: Info = Info {
         filter::EDGE_THRESHOLD,
     ],
     needs: &[multisample::STANDARD_LOCATIONS],
-    samples: MULTIPLE_SAMPLES,
+    samples: ANY_SAMPLES,
     views: multisample::VIEWS,
 };
 
@@ -97,6 +97,8 @@ const FIRST_GUESS_PIXELS: u32 = 4;
 
 /// How the blocks of a frame are laid out.
 struct Layout {
+    /// Samples a pixel. One where no pixel may hold more than its own block and compute fills: then more have no use.
+    samples: u32,
     /// Dynamic blocks.
     capacity: u32,
     /// The capacity is the user's: what finds no block is dropped.
@@ -118,12 +120,14 @@ impl Layout {
         let first_guess = u32::try_from(pixels / u64::from(FIRST_GUESS_PIXELS)).unwrap_or(u32::MAX);
         let capacity = fixed.unwrap_or_else(|| frame.capacity("blocks", first_guess));
         let blocks = pixels + u64::from(capacity);
-        let narrow = blocks <= NARROW_BLOCKS_MAX && frame.samples <= NARROW_SAMPLES_MAX;
+        let by_compute = params.text(&INFO, FILL.key) == "compute";
+        let samples = if capacity == 0 && fixed.is_some() && by_compute { 1 } else { frame.samples };
+        let narrow = blocks <= NARROW_BLOCKS_MAX && samples <= NARROW_SAMPLES_MAX;
         let pointer_words = match (params.text(&INFO, POINTER.key), narrow) {
             ("narrow", false) => {
                 return Err(TechniqueError::Conflict {
                     technique: INFO.id,
-                    found: format!("pointer=narrow with {} samples and {blocks} blocks", frame.samples),
+                    found: format!("pointer=narrow with {samples} samples and {blocks} blocks"),
                     expected: format!(
                         "at most {NARROW_SAMPLES_MAX} samples and {NARROW_BLOCKS_MAX} blocks, or pointer=wide"
                     ),
@@ -134,6 +138,7 @@ impl Layout {
         };
         let in_block = params.text(&INFO, POSITION.key) == "distance";
         Ok(Self {
+            samples,
             capacity,
             is_fixed: fixed.is_some(),
             pointer_words,
@@ -155,7 +160,11 @@ impl Layout {
         let limit = frame.features().max_storage_buffer_range.min(4 * u64::from(u32::MAX));
         if 4 * words > limit {
             return Err(TechniqueError::TooLarge {
-                what: format!("gbuffer-list: bytes of {} blocks of {} bits", self.blocks, 16 * self.pair_words()),
+                what: format!(
+                    "gbuffer-list: bytes of {} blocks of {} bits",
+                    self.blocks,
+                    16 * self.pair_words()
+                ),
                 found: 4 * words,
                 limit,
             });
@@ -197,7 +206,8 @@ impl Technique for GbufferList {
         };
         frame.watch(graph, "blocks", &lists.count, layout.capacity, layout.is_fixed);
         let lights = frame.params.text(&INFO, multisample::LIGHTS.key);
-        multisample::shade(graph, frame, INFO.id, "list", lights, |pass| {
+        let source = if layout.samples == 1 { "list-one" } else { "list" };
+        multisample::shade(graph, frame, INFO.id, (source, layout.samples), lights, |pass| {
             for (name, value) in layout.constants() {
                 pass.constant(name, value);
             }
@@ -228,15 +238,17 @@ fn empty_lists(
 fn build_constants(frame: &Frame<'_>, layout: &Layout) -> Vec<(String, u32)> {
     let mut all = filter::constants(&INFO, frame.params);
     all.extend(layout.constants().map(|(name, value)| (name.to_owned(), value)));
-    all.push(("SAMPLES".to_owned(), frame.samples));
+    all.push(("SAMPLES".to_owned(), layout.samples));
     all.push(("BLOCK_CAPACITY".to_owned(), layout.capacity));
     all
 }
 
 /// Triangle IDs at every sample in one pass over the scene, then a thread a pixel that writes its list.
 fn fill_by_compute(graph: &mut Graph, frame: &Frame<'_>, layout: &Layout) -> Result<Lists, TechniqueError> {
-    let ids = graph.image("gbuffer-list/ids", frame.multisampled_info(vk::Format::R8G8B8A8_UNORM));
-    let depth = graph.image("gbuffer-list/depth", frame.multisampled_info(vk::Format::D32_SFLOAT));
+    let ids =
+        graph.image("gbuffer-list/ids", frame.image_info(vk::Format::R8G8B8A8_UNORM).samples(layout.samples));
+    let depth =
+        graph.image("gbuffer-list/depth", frame.image_info(vk::Format::D32_SFLOAT).samples(layout.samples));
     let surfaces = Surfaces::new(
         frame,
         ("geometry/surface.vert#position", Some("visibility/ids.frag#rgba8")),
@@ -251,7 +263,8 @@ fn fill_by_compute(graph: &mut Graph, frame: &Frame<'_>, layout: &Layout) -> Res
     surfaces.draw(frame, &mut pass);
     pass.finish();
 
-    let mut pass = frame.compute(graph, "gbuffer-list/fill", &frame.shader("gbuffer_list/fill.comp")?);
+    let shader = if layout.samples == 1 { "gbuffer_list/fill.comp#one" } else { "gbuffer_list/fill.comp" };
+    let mut pass = frame.compute(graph, "gbuffer-list/fill", &frame.shader(shader)?);
     for (name, value) in build_constants(frame, layout) {
         pass.constant(&name, value);
     }
@@ -278,13 +291,17 @@ fn fill_by_raster(graph: &mut Graph, frame: &Frame<'_>, layout: &Layout) -> Resu
             expected: "filter=depth-edges, or fill=compute".to_owned(),
         });
     }
-    let depth = graph.image("gbuffer-list/depth", frame.multisampled_info(frame.small_depth_stencil_format()));
+    let depth =
+        graph.image("gbuffer-list/depth", frame.multisampled_info(frame.small_depth_stencil_format()));
     let depth_only = Surfaces::depth_only(frame)?;
-    let mut fill =
-        Surfaces::shaded(frame, "gbuffer_list/fill.frag", "gbuffer_list/fill.frag#mask")?
-            .depth(DepthTest::EQUAL)
-            // Section 4.3: one bit of stencil against double writes of intersecting triangles.
-            .stencil(FIRST_FRAGMENT, 1);
+    let (opaque, masked) = match layout.samples {
+        1 => ("gbuffer_list/fill.frag#one", "gbuffer_list/fill.frag#one-mask"),
+        _ => ("gbuffer_list/fill.frag", "gbuffer_list/fill.frag#mask"),
+    };
+    let mut fill = Surfaces::shaded(frame, opaque, masked)?
+        .depth(DepthTest::EQUAL)
+        // Section 4.3: one bit of stencil against double writes of intersecting triangles.
+        .stencil(FIRST_FRAGMENT, 1);
     fill.constants = build_constants(frame, layout);
     let (blocks, count, flagged) = empty_lists(graph, frame, layout)?;
 

@@ -123,8 +123,7 @@ fn fill(
         let name = format!("{technique}/{}", slot.trim_start_matches("gbuffer_").replace('_', " "));
         declared.push((*slot, graph.image(&name, frame.multisampled_info(*format)), *load));
     }
-    let depth =
-        graph.image(&format!("{technique}/depth"), frame.multisampled_info(vk::Format::D32_SFLOAT));
+    let depth = graph.image(&format!("{technique}/depth"), frame.multisampled_info(vk::Format::D32_SFLOAT));
 
     let mut pass = graph.raster(&format!("{technique}/gbuffer"));
     frame.bind_scene(&mut pass);
@@ -136,12 +135,12 @@ fn fill(
 }
 
 /// Specialization constants of shaders that include `multisample/shade.glsl`.
-pub(crate) fn shade_constants(frame: &Frame<'_>) -> [(&'static str, u32); 2] {
-    [("SAMPLES", frame.samples), ("VIEW", view::number(frame.view))]
+pub(crate) fn shade_constants(frame: &Frame<'_>, samples: u32) -> [(&'static str, u32); 2] {
+    [("SAMPLES", samples), ("VIEW", view::number(frame.view))]
 }
 
 /// Declares the pass `technique/shade`: shades every surface that `source` (a tag of `multisample/shade.comp`) holds of a
-/// pixel and averages them; `bind` binds what the source reads. Returns radiance, RGBA16F.
+/// pixel of `samples` samples and averages them; `bind` binds what the source reads. Returns radiance, RGBA16F.
 ///
 /// # Errors
 /// A shader that is not compiled in.
@@ -149,7 +148,7 @@ pub fn shade(
     graph: &mut Graph,
     frame: &Frame<'_>,
     technique: &str,
-    source: &str,
+    (source, samples): (&str, u32),
     lights: &str,
     bind: impl FnOnce(&mut ComputePass<'_>),
 ) -> Result<ImageHandle, TechniqueError> {
@@ -157,11 +156,12 @@ pub fn shade(
     let tag = if tiled { format!("{source}-tiled") } else { source.to_owned() };
     let name = format!("multisample/shade.comp#{tag}");
     // Lists hold emission in their blocks.
-    let shader = frame.shader(&if source == "list" { name } else { emission_variant(frame, &name) })?;
+    let shader =
+        frame.shader(&if source.starts_with("list") { name } else { emission_variant(frame, &name) })?;
     let radiance =
         graph.image(&format!("{technique}/radiance"), frame.image_info(vk::Format::R16G16B16A16_SFLOAT));
     let mut pass = frame.compute(graph, &format!("{technique}/shade"), &shader);
-    for (name, value) in shade_constants(frame) {
+    for (name, value) in shade_constants(frame, samples) {
         pass.constant(name, value);
     }
     bind(&mut pass);

@@ -4,6 +4,15 @@
 
 layout(constant_id = 8) const uint SAMPLES = 4u;
 
+// Images of one sample are another type than those of several.
+#ifdef ONE_SAMPLE
+#define SAMPLED_IMAGE texture2D
+#define FETCH_SAMPLE(image, pixel, i) texelFetch(image, pixel, 0)
+#else
+#define SAMPLED_IMAGE texture2DMS
+#define FETCH_SAMPLE(image, pixel, i) texelFetch(image, pixel, int(i))
+#endif
+
 // Where sample i stands, pixels from the pixel's upper left corner.
 vec2 sample_location(uint i) {
     const vec2 LOCATIONS[31] = vec2[](

@@ -6,7 +6,7 @@
 #include "heat.glsl"
 #include "multisample/samples.glsl"
 
-layout(set = 0, binding = 8) uniform texture2DMS gbuffer_depth;
+layout(set = 0, binding = 8) uniform SAMPLED_IMAGE gbuffer_depth;
 
 #if defined(SOURCE_DEDUP)
 #include "multisample/source_dedup.glsl"

@@ -35,7 +35,8 @@ pub struct InvocationCount(ImageHandle);
 impl InvocationCount {
     /// Declares the count, zero everywhere.
     pub fn new(graph: &mut Graph, frame: &Frame<'_>, technique: &str) -> Self {
-        let image = graph.image(&format!("{technique}/invocation count"), frame.image_info(vk::Format::R32_UINT));
+        let image =
+            graph.image(&format!("{technique}/invocation count"), frame.image_info(vk::Format::R32_UINT));
         Self(graph.clear_image(&format!("{technique}/clear count"), image, [0.0; 4]))
     }
 
@@ -48,7 +49,12 @@ impl InvocationCount {
     ///
     /// # Errors
     /// A shader that is not compiled in.
-    pub fn heat(self, graph: &mut Graph, frame: &Frame<'_>, technique: &str) -> Result<ImageHandle, TechniqueError> {
+    pub fn heat(
+        self,
+        graph: &mut Graph,
+        frame: &Frame<'_>,
+        technique: &str,
+    ) -> Result<ImageHandle, TechniqueError> {
         let target =
             graph.image(&format!("{technique}/heat"), frame.image_info(vk::Format::R16G16B16A16_SFLOAT));
         let mut pass = frame.compute(graph, &format!("{technique}/heat"), &frame.shader("view/heat.comp")?);

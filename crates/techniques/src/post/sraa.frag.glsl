@@ -1,0 +1,21 @@
+// What SRAA keeps of a surface besides its depth: the plane's normal and the material (Chajdas et al. 2011, section 3).
+//
+// Out: RGBA8: octahedral normal of the triangle, 12 + 12 bits, and eight bits of the material's number; see sraa.comp.glsl.
+// Four channels of eight bits, since lavapipe has no multisampled integers.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "surface_in.glsl"
+
+layout(location = 0) out vec4 packed_surface;
+
+void main() {
+#ifdef ALPHA_MASK
+    visible_base_color(load_material(draw_material.y), surface_point());
+#endif
+    // The triangle's own plane: what its vertices' normals say is not where it lies.
+    vec3 normal = cross(dFdx(position_ws), dFdy(position_ws));
+    float square = dot(normal, normal);
+    vec2 octahedral = square > 0.0 ? octahedral_encode(normal * inversesqrt(square)) : vec2(0.0);
+    uvec2 bits = uvec2(round((octahedral * 0.5 + 0.5) * 4095.0));
+    packed_surface = unpackUnorm4x8(bits.x | bits.y << 12 | (draw_material.y & 0xffu) << 24);
+}
