@@ -1,6 +1,8 @@
 //! `afterlight bench`: the experiments, a file each.
 
+mod antialiasing;
 mod msaa_table1;
+mod msaa_table2;
 mod speed;
 
 use std::path::Path;
@@ -8,7 +10,7 @@ use std::path::Path;
 use afterlight_measure::{Run, RunResult, SCHEMA, Status};
 use afterlight_report::{Picture, Section};
 use afterlight_techniques::cost::Workload;
-use afterlight_techniques::{Params, Renderer, Settings, view};
+use afterlight_techniques::{Params, Post, Renderer, Settings, view};
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -31,7 +33,8 @@ struct Experiment {
 }
 
 /// All experiments, in the order of `bench all`.
-const EXPERIMENTS: &[Experiment] = &[speed::EXPERIMENT, msaa_table1::EXPERIMENT];
+const EXPERIMENTS: &[Experiment] =
+    &[speed::EXPERIMENT, msaa_table1::EXPERIMENT, msaa_table2::EXPERIMENT, antialiasing::EXPERIMENT];
 
 /// What an experiment found.
 struct Outcome {
@@ -120,7 +123,7 @@ fn to_json(value: &impl Serialize) -> Result<Value, Failure> {
 /// Width and height of the papers' experiments on anti-aliasing, pixels.
 const FULL_HD_PX: (u32, u32) = (1920, 1080);
 
-/// The common options at the size of an experiment: its own unless one was given, scaled; one sample, the final image.
+/// The common options at the size of an experiment: its own unless one was given, scaled; one sample, the final image without a filter.
 fn at_size(args: &BenchArgs, own_px: (u32, u32)) -> CommonArgs {
     let common = &args.common;
     let (width, height) = if args.given.size { (common.width, common.height) } else { own_px };
@@ -129,6 +132,7 @@ fn at_size(args: &BenchArgs, own_px: (u32, u32)) -> CommonArgs {
         width: scaled(width),
         height: scaled(height),
         samples: 1,
+        post: crate::args::Post::None,
         view: view::FINAL.to_owned(),
         ..common.clone()
     }
@@ -150,6 +154,8 @@ struct Setup {
     label: String,
     /// Samples a pixel.
     samples: u32,
+    /// Anti-aliasing after shading.
+    post: Post,
     /// The technique and its parameters.
     chosen: Chosen,
 }
@@ -166,7 +172,12 @@ impl Setup {
         for (key, value) in params {
             chosen.params.set(technique.info(), key, value)?;
         }
-        Ok(Setup { label: label.into(), samples, chosen })
+        Ok(Setup { label: label.into(), samples, post: Post::None, chosen })
+    }
+
+    /// The same with a filter after it.
+    fn post(self, post: Post) -> Setup {
+        Setup { post, ..self }
     }
 }
 
@@ -187,7 +198,12 @@ fn measure(
 ) -> Result<InTurn, Failure> {
     let renderers = setups
         .iter()
-        .map(|setup| renderer_with(base, |settings| settings.samples = setup.samples))
+        .map(|setup| {
+            renderer_with(base, |settings| {
+                settings.samples = setup.samples;
+                settings.post = setup.post;
+            })
+        })
         .collect::<Result<Vec<_>, _>>()?;
     let entrants: Vec<Entrant<'_>> = setups
         .iter()
@@ -215,32 +231,131 @@ struct Row<Cell> {
     cells: Vec<Cell>,
 }
 
-/// A run of results with one number of samples.
+/// Measured set-ups with an experiment's cells of each.
+struct Table<'a, Cell> {
+    setups: Vec<&'a Setup>,
+    results: Vec<RunResult>,
+    cells: Vec<Vec<Cell>>,
+    /// What a report tells of each.
+    remarks: Vec<Option<String>>,
+}
+
+impl<Cell: Clone> Table<'_, Cell> {
+    /// Runs: one for each number of samples and filter, in the order of the first set-up of each.
+    fn rows(&self, session: &Session, common: &CommonArgs, frames: u32, reference: &str) -> Vec<Row<Cell>> {
+        let groups = groups(&self.setups, |setup| (setup.samples, setup.post));
+        let row = |((samples, post), members): ((u32, Post), Vec<usize>)| {
+            let results = members.iter().map(|&index| self.results[index].clone()).collect();
+            Row {
+                run: run_of(session, common, (samples, post), frames, reference, results),
+                cells: members.iter().flat_map(|&index| self.cells[index].clone()).collect(),
+            }
+        };
+        groups.into_iter().map(row).collect()
+    }
+
+    /// The same for a report, under labels, one section for each number of samples.
+    fn parts(
+        &self,
+        session: &Session,
+        common: &CommonArgs,
+        frames: u32,
+        reference: &str,
+        heading: &str,
+        note: &str,
+    ) -> Vec<Part> {
+        let part = |(samples, members): (u32, Vec<usize>)| {
+            let labelled = |&index: &usize| {
+                labelled(&self.results[index], &self.setups[index].label, self.remarks[index].clone())
+            };
+            let results = members.iter().map(labelled).collect();
+            Part {
+                heading: format!("{heading}{samples} sample{} a pixel", if samples == 1 { "" } else { "s" }),
+                note: note.to_owned(),
+                run: run_of(session, common, (samples, Post::None), frames, reference, results),
+                pictures: Vec::new(),
+            }
+        };
+        groups(&self.setups, |setup| setup.samples).into_iter().map(part).collect()
+    }
+}
+
+/// Groups set-ups by what they share, groups and members in the order in which they come.
+fn groups<Key: PartialEq>(setups: &[&Setup], key: impl Fn(&Setup) -> Key) -> Vec<(Key, Vec<usize>)> {
+    let mut groups: Vec<(Key, Vec<usize>)> = Vec::new();
+    for (index, setup) in setups.iter().enumerate() {
+        let key = key(setup);
+        match groups.iter_mut().find(|(known, _)| *known == key) {
+            Some((_, members)) => members.push(index),
+            None => groups.push((key, vec![index])),
+        }
+    }
+    groups
+}
+
+/// A run of results with one number of samples and one filter.
 fn run_of(
     session: &Session,
     common: &CommonArgs,
-    samples: u32,
+    (samples, post): (u32, Post),
     frames: u32,
     reference: &str,
     results: Vec<RunResult>,
 ) -> Run {
     let common = CommonArgs { samples, ..common.clone() };
+    let mut settings = session.settings_record(&common, frames, reference);
+    settings.post = post.name().to_owned();
     Run {
         schema: SCHEMA,
         device: session.device.clone(),
         scene: session.scene.clone(),
-        settings: session.settings_record(&common, frames, reference),
+        settings,
         results,
         process: None,
     }
 }
 
-/// Numbers of samples of set-ups, each once, in their order.
-fn samples_of<'a>(setups: impl IntoIterator<Item = &'a Setup>) -> Vec<u32> {
-    let mut samples: Vec<u32> = setups.into_iter().map(|setup| setup.samples).collect();
-    samples.sort_unstable();
-    samples.dedup();
-    samples
+/// A filter of `gbuffer-list` as the experiments set it: its name and its parameters.
+struct Filter {
+    name: &'static str,
+    params: &'static [(&'static str, &'static str)],
+}
+
+/// Every filter, each alone. Foliage is flagged by its material's name, as the paper flags trees; regions and thresholds are
+/// the parameters' defaults, written out.
+const FILTERS: &[Filter] = &[
+    Filter { name: "ellipse", params: &[("filter", "ellipse")] },
+    Filter { name: "rectangle", params: &[("filter", "rectangle")] },
+    Filter { name: "depth", params: &[("filter", "depth"), ("depth-threshold", "20")] },
+    Filter { name: "objects", params: &[("filter", "objects"), ("objects", "leaves")] },
+    Filter { name: "depth-edges", params: &[("filter", "depth-edges"), ("edge-threshold", "0.02")] },
+    Filter { name: "edges", params: &[("filter", "edges"), ("edge-threshold", "0.02")] },
+];
+
+/// What the paper of the per-pixel lists measured on; its Table 2 does not say which figures are of which.
+const LISTS_PAPER_DEVICE: &str = "GTX 970 or GTX 1050 (the paper does not say which)";
+
+/// A counter of a result.
+fn counter(result: &RunResult, name: &str) -> Option<u64> {
+    result.counters.get(name).and_then(Value::as_u64)
+}
+
+/// A number of a table, or a dash.
+fn number_text(value: Option<f64>, decimals: usize) -> String {
+    value.map_or_else(|| "–".to_owned(), |value| format!("{value:.decimals$}"))
+}
+
+/// Lines that say why a set-up has no figures, each reason once.
+fn reasons_text(setups: &[&Setup], results: &[RunResult]) -> String {
+    let mut told: Vec<(&str, Vec<&str>)> = Vec::new();
+    for (setup, result) in setups.iter().zip(results) {
+        let Some(reason) = result.reason.as_deref().filter(|_| result.status != Status::Ok) else { continue };
+        match told.iter_mut().find(|(known, _)| *known == reason) {
+            Some((_, labels)) => labels.push(&setup.label),
+            None => told.push((reason, vec![&setup.label])),
+        }
+    }
+    told.iter().map(|(reason, labels)| format!("{}: {reason}\n", labels.join(", "))).collect()
 }
 
 /// A result under its label, for a report: techniques stand there several times with other parameters.

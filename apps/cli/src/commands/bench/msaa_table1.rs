@@ -6,14 +6,14 @@
 
 use afterlight_graph::gpu::vk;
 use afterlight_graph::{Graph, ImageHandle, ImageInfo, Load};
-use afterlight_measure::{Buffer, Memory, Run, RunResult, SCHEMA, Status};
+use afterlight_measure::{Buffer, Memory, RunResult, SCHEMA, Status};
 use afterlight_scene::{LoadOptions, load_source};
 use afterlight_techniques::{Params, Renderer, SceneGpu, Settings};
 use serde::Serialize;
 
 use super::{
-    Experiment, FULL_HD_PX, Outcome, Part, Row, Setup, at_size, broken_off, labelled, run_of, sample_counts,
-    samples_of, status_text, to_json,
+    Experiment, FULL_HD_PX, Outcome, Row, Setup, Table, at_size, broken_off, counter, sample_counts,
+    status_text, to_json,
 };
 use crate::args::{BenchArgs, CommonArgs, DEFAULT_SCENE};
 use crate::failure::Failure;
@@ -262,7 +262,14 @@ fn run(args: &BenchArgs, progress: &Progress) -> Result<Outcome, Failure> {
         })
     });
 
-    let (rows, sections) = rows(&session, &common, &columns, results, cells, &notes);
+    let table = Table {
+        setups: columns.iter().map(|column| &column.setup).collect(),
+        remarks: cells.iter().map(|cells| Some(remark(cells))).collect(),
+        results,
+        cells,
+    };
+    let rows = table.rows(&session, &common, 1, "none");
+    let sections = table.parts(&session, &common, 1, "none", "", &notes.join(". "));
     let json = to_json(&Table1 {
         schema: SCHEMA,
         experiment: EXPERIMENT.name,
@@ -394,9 +401,8 @@ fn single_sample_layout(base: &Renderer) -> Result<RunResult, Failure> {
         });
         let mut pass = graph.raster("bench/layout");
         let [base_color, normal, roughness, depth] = images;
-        let mut written: Vec<ImageHandle> = [base_color, normal, roughness]
-            .map(|image| pass.color(image, Load::Clear([0.0; 4])))
-            .into();
+        let mut written: Vec<ImageHandle> =
+            [base_color, normal, roughness].map(|image| pass.color(image, Load::Clear([0.0; 4]))).into();
         written.push(pass.depth(depth, Load::Clear(0.0)));
         pass.finish();
         for image in &written {
@@ -445,7 +451,7 @@ fn part(
 fn resources(column: &Column, result: &RunResult, pixels: u64) -> Vec<Resource> {
     // Two interleaved blocks: 10 bytes of content each with a pointer of 4, and 4 of distance.
     let pair_bytes = if result.params.get("position").is_some_and(|p| p == "distance") { 36 } else { 28 };
-    let blocks = result.counters.get("blocks_capacity").and_then(serde_json::Value::as_u64).unwrap_or(0);
+    let blocks = counter(result, "blocks_capacity").unwrap_or(0);
     let samples = u64::from(column.setup.samples);
     result
         .memory
@@ -512,7 +518,7 @@ fn cell(column: &Column, result: &RunResult, what: What, resources: &[Resource],
 }
 
 fn note(column: &Column, result: &RunResult, what: What) -> String {
-    let needed = result.counters.get("blocks_needed").and_then(serde_json::Value::as_u64);
+    let needed = counter(result, "blocks_needed");
     match needed.filter(|_| matches!(what, What::GBuffer | What::Total)) {
         Some(needed) => format!("{}; the view needs {needed} dynamic blocks", column.note),
         None => column.note.clone(),
@@ -637,41 +643,6 @@ fn verdict_text(verdict: &Verdict) -> String {
     };
     let off: String = verdict.off.iter().map(|off| format!("  off: {off}\n")).collect();
     format!("{}: {} of {}: {answer}\n{off}", verdict.claim, verdict.within, verdict.compared)
-}
-
-/// A run for each number of samples, and the same as a report shows it.
-fn rows(
-    session: &Session,
-    common: &CommonArgs,
-    columns: &[Column],
-    results: Vec<RunResult>,
-    cells: Vec<Vec<Cell>>,
-    notes: &[String],
-) -> (Vec<Row<Cell>>, Vec<Part>) {
-    let mut rows = Vec::new();
-    let mut sections = Vec::new();
-    let setups: Vec<&Setup> = columns.iter().map(|column| &column.setup).collect();
-    for samples in samples_of(setups.iter().copied()) {
-        let of_samples = |index: &usize| setups[*index].samples == samples;
-        let chosen: Vec<usize> = (0..columns.len()).filter(of_samples).collect();
-        let run = |results| run_of(session, common, samples, 1, "none", results);
-        let shown: Vec<RunResult> = chosen
-            .iter()
-            .map(|&index| labelled(&results[index], &setups[index].label, Some(remark(&cells[index]))))
-            .collect();
-        let report: Run = run(shown);
-        sections.push(Part {
-            heading: format!("{samples} sample(s) a pixel"),
-            note: notes.join(". "),
-            run: report,
-            pictures: Vec::new(),
-        });
-        rows.push(Row {
-            run: run(chosen.iter().map(|&index| results[index].clone()).collect()),
-            cells: chosen.iter().flat_map(|&index| cells[index].clone()).collect(),
-        });
-    }
-    (rows, sections)
 }
 
 /// What a report tells of a column.
