@@ -335,6 +335,44 @@ fn bench_msaa_table1_has_all_cells_beside_the_papers() {
     assert!(html.contains("MSAA 4x") && html.contains("G-buffer"));
 }
 
+#[test]
+fn bench_of_anti_aliasing_runs_on_small_images() {
+    if !has_device() {
+        return;
+    }
+    let folder = folder();
+    let common = ["--scenes", "builtin:edge", "--scale", "0.05", "--samples", "4", "--frames", "1", "--json", "-"];
+
+    let table2 = [
+        &["bench", "msaa-table2", "--light-counts", "5", "--techniques", "deferred-ssaa,gbuffer-list"][..],
+        &common,
+    ]
+    .concat();
+    let output = run_in(folder.path(), &table2);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let found = json(&output);
+    let row = &found["rows"][0];
+    assert_eq!((&row["settings"]["width"], &row["scene"]["lights"]), (&96.into(), &5.into()));
+    let columns: Vec<_> =
+        row["cells"].as_array().expect("a list").iter().map(|cell| cell["column"].clone()).collect();
+    assert!(columns.contains(&"gbuffer-list 4x, edges".into()), "{columns:?}");
+    assert!(found["duels"][0]["ratio"].is_number(), "{}", found["duels"]);
+
+    let quality = [&["bench", "antialiasing", "--report", "r"][..], &common].concat();
+    let output = run_in(folder.path(), &quality);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let found = json(&output);
+    let rows = found["rows"].as_array().expect("a list");
+    let posts: Vec<_> = rows.iter().map(|row| row["settings"]["post"].clone()).collect();
+    assert_eq!(posts, ["none", "fxaa", "smaa", "sraa", "none"]);
+    for cell in rows.iter().flat_map(|row| row["cells"].as_array().expect("a list")) {
+        assert!(cell["flip"].is_number() && cell["psnr_db"].is_number(), "{cell}");
+    }
+    assert_eq!(found["post"].as_array().map(Vec::len), Some(3));
+    let html = fs::read_to_string(folder.path().join("r/report.html")).expect("written");
+    assert!(html.contains("below forward 1x") && html.contains("data:image/png;base64,"));
+}
+
 /// The folder of reference scenes, beside the repository.
 fn reference_scenes() -> Option<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/scenes");

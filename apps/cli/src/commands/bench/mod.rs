@@ -355,7 +355,7 @@ fn reasons_text(setups: &[&Setup], results: &[RunResult]) -> String {
             None => told.push((reason, vec![&setup.label])),
         }
     }
-    told.iter().map(|(reason, labels)| format!("{}: {reason}\n", labels.join(", "))).collect()
+    told.iter().map(|(reason, labels)| format!("{}: {reason}\n", labels.join("; "))).collect()
 }
 
 /// A result under its label, for a report: techniques stand there several times with other parameters.
