@@ -341,7 +341,8 @@ fn bench_of_anti_aliasing_runs_on_small_images() {
         return;
     }
     let folder = folder();
-    let common = ["--scenes", "builtin:edge", "--scale", "0.05", "--samples", "4", "--frames", "1", "--json", "-"];
+    let common =
+        ["--scenes", "builtin:edge", "--scale", "0.05", "--samples", "4", "--frames", "1", "--json", "-"];
 
     let table2 = [
         &["bench", "msaa-table2", "--light-counts", "5", "--techniques", "deferred-ssaa,gbuffer-list"][..],

@@ -118,10 +118,13 @@ struct Antialiasing {
     post_holds: Option<bool>,
 }
 
+/// A point of a sweep: the detector of edges and its threshold; none for what is no point of any.
+type Sweep = Option<(&'static str, &'static str)>;
+
 /// A set-up, and the sweep that it is a point of.
 struct Column {
     setup: Setup,
-    sweep: Option<(&'static str, &'static str)>,
+    sweep: Sweep,
 }
 
 fn run(args: &BenchArgs, progress: &Progress) -> Result<Outcome, Failure> {
@@ -285,16 +288,11 @@ fn list_columns(samples: u32, blocks_needed: u64) -> Result<Vec<Column>, Failure
     Ok(columns)
 }
 
-fn cells(
-    setups: &[Setup],
-    sweeps: &[Option<(&'static str, &'static str)>],
-    measured: &[Measured],
-    pixels: u64,
-) -> Vec<Cell> {
+fn cells(setups: &[Setup], sweeps: &[Sweep], measured: &[Measured], pixels: u64) -> Vec<Cell> {
     let flip = |one: &Measured| one.result.difference.and_then(|difference| difference.flip);
     let flip_none =
         setups.iter().position(|setup| setup.label == NONE).and_then(|index| flip(&measured[index]));
-    let cell = |((setup, sweep), one): ((&Setup, &Option<(&'static str, &'static str)>), &Measured)| {
+    let cell = |((setup, sweep), one): ((&Setup, &Sweep), &Measured)| {
         let result = &one.result;
         let has_figures = result.status == Status::Ok;
         Cell {

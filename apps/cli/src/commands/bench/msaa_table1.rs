@@ -359,7 +359,7 @@ fn columns(base: &Renderer, sample_counts: &[u32]) -> Result<Vec<Column>, Failur
                     // What a view uses is the view's: the paper's scene is another.
                     comparable: comparable && blocks != Blocks::Used,
                     depth_bytes,
-                    note: list_note(comparable, depth_bytes),
+                    note: list_note(comparable, depth_bytes, blocks),
                 });
             }
         }
@@ -367,8 +367,11 @@ fn columns(base: &Renderer, sample_counts: &[u32]) -> Result<Vec<Column>, Failur
     Ok(columns)
 }
 
-fn list_note(is_papers: bool, depth_bytes: u64) -> String {
+fn list_note(is_papers: bool, depth_bytes: u64, blocks: Blocks) -> String {
     match (is_papers, depth_bytes) {
+        (false, _) if blocks == Blocks::Min => {
+            "blocks of 144 bits (with the sample's distance), and 4 bytes of triangle ID; one sample a pixel is rasterised, as there is no block for another".to_owned()
+        }
         (true, 4) => "blocks of 112 bits, depth and stencil 4 bytes a sample".to_owned(),
         (true, _) => format!(
             "blocks of 112 bits; the device has no depth with stencil in 4 bytes, a sample takes {depth_bytes}: the 4 of depth are compared"
@@ -447,12 +450,18 @@ fn part(
     })
 }
 
+/// Samples a pixel that are rasterised: lists filled in compute take one where there is no block for another.
+fn rasterised_samples(column: &Column, result: &RunResult, blocks: u64) -> u64 {
+    let in_compute = result.params.get("fill").is_some_and(|fill| fill == "compute");
+    if in_compute && blocks == 0 { 1 } else { u64::from(column.setup.samples) }
+}
+
 /// The images and buffers of a result that the table knows.
 fn resources(column: &Column, result: &RunResult, pixels: u64) -> Vec<Resource> {
     // Two interleaved blocks: 10 bytes of content each with a pointer of 4, and 4 of distance.
     let pair_bytes = if result.params.get("position").is_some_and(|p| p == "distance") { 36 } else { 28 };
     let blocks = counter(result, "blocks_capacity").unwrap_or(0);
-    let samples = u64::from(column.setup.samples);
+    let samples = rasterised_samples(column, result, blocks);
     result
         .memory
         .iter()
@@ -761,6 +770,18 @@ mod tests {
         let depth = of(&found, What::ZBuffer);
         assert_eq!(depth.bytes, Some(PIXELS * 32));
         assert!(depth.deviation_percent.expect("there").abs() < 0.1, "{depth:?}");
+    }
+
+    #[test]
+    fn lists_filled_in_compute_rasterise_what_has_blocks() {
+        let column = column(Blocks::Min, 4);
+        let mut result = result(PIXELS, 0, 4, 0);
+        assert_eq!(rasterised_samples(&column, &result, 0), 4);
+        result.params.insert("fill".into(), "compute".into());
+        assert_eq!(
+            (rasterised_samples(&column, &result, 0), rasterised_samples(&column, &result, 1)),
+            (1, 4)
+        );
     }
 
     #[test]
