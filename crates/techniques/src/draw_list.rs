@@ -63,7 +63,7 @@ impl DrawList {
             device.create_buffer(&gpu::BufferDesc {
                 name,
                 bytes,
-                usage: vk::BufferUsageFlags::INDIRECT_BUFFER,
+                usage: vk::BufferUsageFlags::INDIRECT_BUFFER | vk::BufferUsageFlags::STORAGE_BUFFER,
                 memory: gpu::MemoryKind::Upload,
             })
         };

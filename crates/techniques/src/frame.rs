@@ -147,6 +147,11 @@ impl Frame<'_> {
         }
     }
 
+    /// Whether the device is a CPU.
+    pub fn is_cpu(&self) -> bool {
+        self.device.info().kind == "cpu"
+    }
+
     /// What the device can do.
     pub fn features(&self) -> &gpu::Features {
         self.device.features()

@@ -22,6 +22,7 @@ pub use afterlight_scene as scene;
 pub use afterlight_shader as shader;
 
 mod capacity;
+pub mod compute_raster;
 pub mod cost;
 mod draw_list;
 mod error;
@@ -42,13 +43,13 @@ mod textures;
 pub mod view;
 pub mod volumes;
 
+pub use capacity::Counter;
 pub use draw_list::{DrawOptions, DrawOrder};
 pub use error::TechniqueError;
 pub use frame::Frame;
 pub use light_list::LightList;
 pub use params::{ParamInfo, ParamKind, Params};
 pub use post::Post;
-pub use capacity::Counter;
 pub use renderer::{Prepared, Renderer, Settings};
 pub use scene_gpu::SceneGpu;
 pub use technique::{

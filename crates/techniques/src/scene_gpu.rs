@@ -207,6 +207,9 @@ pub(crate) fn record_image<T: bytemuck::NoUninit>(
     Ok(image)
 }
 
+/// A draw: its record, what the CPU needs of it, the names of its node and its material.
+type Draw = (DrawData, DrawInfo, [Arc<str>; 2]);
+
 /// All draws of a scene by bucket.
 struct DrawTable {
     data: Vec<DrawData>,
@@ -217,7 +220,7 @@ struct DrawTable {
 
 impl DrawTable {
     fn new(scene: &Scene, pieces: &[Vec<Aabb>], warnings: &mut Vec<String>) -> Result<Self, TechniqueError> {
-        let mut by_bucket: [Vec<(DrawData, DrawInfo, [Arc<str>; 2])>; BUCKETS] = Default::default();
+        let mut by_bucket: [Vec<Draw>; BUCKETS] = Default::default();
         let mut blended = 0u64;
         for instance in &scene.instances {
             let mesh = &scene.meshes[instance.mesh as usize];

@@ -5,7 +5,7 @@
 // against double writes, since a sample's triangle is one; a pixel's blocks are neighbours in memory. Where a pixel keeps one
 // sample (a filter, or no blocks left) it is the surface at the pixel's centre, as at one sample a pixel.
 //
-// In: ids, RGBA8 as 32 bits, gbuffer_depth, the scene. Out: Blocks, BlockCount. Dispatch: 8x8 groups.
+// In: ids, RGBA8 as 32 bits, and gbuffer_depth, or the keys of compute_raster; the scene. Out: Blocks, BlockCount. Dispatch: 8x8 groups.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_basic : require
@@ -18,13 +18,36 @@
 #include "gbuffer_list/filter.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
+#ifdef SAMPLES_IN_KEYS
+// VkDrawIndexedIndirectCommand: index count, 1, first index, vertex offset, draw.
+layout(set = 0, binding = 9, scalar) readonly buffer DrawCommands {
+    uint draw_commands[];
+};
+#else
 layout(set = 0, binding = 8) uniform SAMPLED_IMAGE ids;
+#endif
 
 ivec2 pixel;
+
+#ifdef SAMPLES_IN_KEYS
+// The triangle's place in the order of draws: as good as its ID to tell triangles apart.
+uint sample_id(uint i) {
+    return ~sample_keys[sample_word(pixel, i)];
+}
+
+uint triangle_id(uint order) {
+    return draw_commands[(order >> TRIANGLE_BITS) * 5u + 4u] << TRIANGLE_BITS | order & ((1u << TRIANGLE_BITS) - 1u);
+}
+#else
+uint triangle_id(uint id) {
+    return id;
+}
 
 uint sample_id(uint i) {
     return packUnorm4x8(FETCH_SAMPLE(ids, pixel, i));
 }
+
+#endif
 
 // A triangle that shows in the pixel.
 struct Visible {
@@ -44,11 +67,11 @@ Visible take_triangle(inout uint mask) {
 }
 
 float sample_distance(uint i) {
-    return distance_from_depth(FETCH_SAMPLE(gbuffer_depth, pixel, i).r);
+    return distance_from_depth(SAMPLE_DEPTH(pixel, i));
 }
 
 bool is_filtered(Visible v) {
-    return FILTERS != 0u && single_sample_surface(v.id >> TRIANGLE_BITS, sample_distance(uint(findLSB(v.samples))));
+    return FILTERS != 0u && single_sample_surface(triangle_id(v.id) >> TRIANGLE_BITS, sample_distance(uint(findLSB(v.samples))));
 }
 
 // Takes the next triangle that a block is written for; `NO_TRIANGLE` where there is none left.
@@ -81,7 +104,7 @@ Visible center_triangle() {
             continue;
         }
         float depth;
-        if (triangle_at(v.id, ndc, depth) && depth > nearest_depth) {
+        if (triangle_at(triangle_id(v.id), ndc, depth) && depth > nearest_depth) {
             nearest_depth = depth;
             nearest = v;
         }
@@ -103,7 +126,7 @@ bool surfaces_differ() {
     if (v.id == NO_TRIANGLE) {
         return mask != 0u;
     }
-    SurfacePoint first = triangle_point(v.id, ndc, first_material);
+    SurfacePoint first = triangle_point(triangle_id(v.id), ndc, first_material);
     vec3 normal = unit_or_zero(first.normal_ws);
     // World size of a pixel at this distance, m.
     float distance_m = sample_distance(uint(findLSB(v.samples)));
@@ -115,10 +138,10 @@ bool surfaces_differ() {
         if (v.id == NO_TRIANGLE) {
             return true;
         }
-        SurfacePoint point = triangle_point(v.id, ndc, material);
+        SurfacePoint point = triangle_point(triangle_id(v.id), ndc, material);
         // Where the surface shows, not at the centre, which it may not cover.
         uint i = uint(findLSB(v.samples));
-        vec3 shown_ws = position_from_depth(ndc_from_sample(pixel, i), FETCH_SAMPLE(gbuffer_depth, pixel, i).r);
+        vec3 shown_ws = position_from_depth(ndc_from_sample(pixel, i), SAMPLE_DEPTH(pixel, i));
         float apart_m = abs(dot(normal, shown_ws - first.position_ws));
         if (material != first_material || dot(normal, unit_or_zero(point.normal_ws)) < 1.0 - EDGE_THRESHOLD
             || apart_m > 2.0 * pixel_m) {
@@ -185,7 +208,7 @@ void main() {
     }
     while (current.id != NO_TRIANGLE) {
         uint material;
-        SurfacePoint point = triangle_point(current.id, ndc_from_pixel(uvec2(pixel)), material);
+        SurfacePoint point = triangle_point(triangle_id(current.id), ndc_from_pixel(uvec2(pixel)), material);
         MaterialData m = load_material(material);
         Surface s = surface_at(m, point, base_color_at(m, point).rgb);
         float distance_m = max(dot(frame.distance_from_world, vec4(s.position_ws, 1.0)), 0.0);

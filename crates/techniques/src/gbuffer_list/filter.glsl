@@ -19,7 +19,9 @@ layout(constant_id = 19) const float REGION_BOTTOM = 1.0;
 layout(constant_id = 20) const float DEPTH_THRESHOLD_M = 0.0;
 layout(constant_id = 21) const float EDGE_THRESHOLD = 0.0;  // see depth_edge and surfaces_differ
 
+#ifndef SAMPLES_IN_KEYS
 layout(set = 0, binding = 9) uniform SAMPLED_IMAGE gbuffer_depth;
+#endif
 layout(set = 0, binding = 12, scalar) readonly buffer SingleSampleDraws {
     uint single_sample_draws[];     // a bit a draw
 };
@@ -42,7 +44,7 @@ bool filtered_by_region(ivec2 pixel) {
 bool depth_edge(ivec2 pixel) {
     float near = 0.0, far = 1.0;    // depth is reversed
     for (uint i = 0u; i < SAMPLES; ++i) {
-        float depth = FETCH_SAMPLE(gbuffer_depth, pixel, i).r;
+        float depth = SAMPLE_DEPTH(pixel, i);
         near = max(near, depth);
         far = min(far, depth);
     }

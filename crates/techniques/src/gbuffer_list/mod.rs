@@ -8,7 +8,7 @@ use afterlight_graph::{BufferHandle, DepthTest, Graph, ImageHandle, Load, gpu::v
 
 use crate::{
     ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, ParamInfo, ParamKind, Params, Source, Technique,
-    TechniqueError,
+    TechniqueError, compute_raster,
     cost::{self, Cost, Workload},
     depth_prepass::FIRST_FRAGMENT,
     geometry::Surfaces,
@@ -26,6 +26,12 @@ const FILL: ParamInfo = ParamInfo {
     summary: "who builds the lists: compute over a multisampled visibility buffer, or a second raster pass after a depth pre-pass (the paper's)",
     kind: ParamKind::Choice { values: &["compute", "raster"] },
     default: "compute",
+};
+const VISIBILITY: ParamInfo = ParamInfo {
+    key: "visibility",
+    summary: "who finds the triangles that fill=compute reads: a raster pass, or rasterisation in compute; auto: compute on a GPU that has 64-bit buffer atomics",
+    kind: ParamKind::Choice { values: &["auto", "raster", "compute"] },
+    default: "auto",
 };
 const BLOCKS: ParamInfo = ParamInfo {
     key: "blocks",
@@ -70,6 +76,8 @@ static INFO: Info = Info {
     params: &[
         multisample::LIGHTS,
         FILL,
+        VISIBILITY,
+        compute_raster::SMALL,
         BLOCKS,
         POINTER,
         POSITION,
@@ -185,7 +193,13 @@ impl Layout {
 struct Lists {
     blocks: BufferHandle,
     count: BufferHandle,
-    depth: ImageHandle,
+    samples: Samples,
+}
+
+/// Where the samples' depths are.
+enum Samples {
+    Depth(ImageHandle),
+    Keys(BufferHandle),
 }
 
 impl Technique for GbufferList {
@@ -200,20 +214,32 @@ impl Technique for GbufferList {
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let layout = Layout::new(frame)?;
         let by_raster = frame.params.text(&INFO, FILL.key) == "raster";
-        let lists = match by_raster {
-            true => fill_by_raster(graph, frame, &layout)?,
-            false => fill_by_compute(graph, frame, &layout)?,
+        let keys = match frame.params.text(&INFO, VISIBILITY.key) {
+            "auto" => compute_raster::is_faster(frame),
+            text => text == "compute",
+        };
+        let lists = match (by_raster, keys) {
+            (true, _) => fill_by_raster(graph, frame, &layout)?,
+            (false, true) => fill_from_keys(graph, frame, &layout)?,
+            (false, false) => fill_by_compute(graph, frame, &layout)?,
         };
         frame.watch(graph, "blocks", &lists.count, layout.capacity, layout.is_fixed);
         let lights = frame.params.text(&INFO, multisample::LIGHTS.key);
-        let source = if layout.samples == 1 { "list-one" } else { "list" };
+        let source = match &lists.samples {
+            Samples::Keys(_) => "list-keys",
+            Samples::Depth(_) if layout.samples == 1 => "list-one",
+            Samples::Depth(_) => "list",
+        };
         multisample::shade(graph, frame, INFO.id, (source, layout.samples), lights, |pass| {
             for (name, value) in layout.constants() {
                 pass.constant(name, value);
             }
             pass.constant("KEEPS_ALL", u32::from(layout.keeps_all));
             pass.read("Blocks", &lists.blocks);
-            pass.read("gbuffer_depth", &lists.depth);
+            match &lists.samples {
+                Samples::Depth(depth) => pass.read("gbuffer_depth", depth),
+                Samples::Keys(keys) => pass.read("SampleKeys", keys),
+            };
         })
     }
 }
@@ -273,7 +299,33 @@ fn fill_by_compute(graph: &mut Graph, frame: &Frame<'_>, layout: &Layout) -> Res
     let count = pass.write("BlockCount", count);
     pass.dispatch(frame.groups(8));
     pass.finish();
-    Ok(Lists { blocks, count, depth })
+    Ok(Lists { blocks, count, samples: Samples::Depth(depth) })
+}
+
+/// As [`fill_by_compute`], the triangles found in compute as well.
+fn fill_from_keys(graph: &mut Graph, frame: &Frame<'_>, layout: &Layout) -> Result<Lists, TechniqueError> {
+    if !compute_raster::is_supported(frame.features()) {
+        return Err(TechniqueError::Unavailable {
+            technique: INFO.id,
+            missing:
+                "64-bit integers and buffer atomics for visibility=compute (visibility=raster does without)"
+                    .to_owned(),
+        });
+    }
+    let small_px = frame.params.number(&INFO, compute_raster::SMALL.key) as u32;
+    let keys = compute_raster::rasterize(graph, frame, INFO.id, layout.samples, small_px)?;
+    let (blocks, count, flagged) = empty_lists(graph, frame, layout)?;
+    let mut pass = frame.compute(graph, "gbuffer-list/fill", &frame.shader("gbuffer_list/fill.comp#keys")?);
+    for (name, value) in build_constants(frame, layout) {
+        pass.constant(&name, value);
+    }
+    pass.read("SampleKeys", &keys).read("DrawCommands", &frame.buffers.commands);
+    pass.read("SingleSampleDraws", &flagged);
+    let blocks = pass.write("Blocks", blocks);
+    let count = pass.write("BlockCount", count);
+    pass.dispatch(frame.groups(8));
+    pass.finish();
+    Ok(Lists { blocks, count, samples: Samples::Keys(keys) })
 }
 
 /// A depth pre-pass, then fragments that write themselves where they show (the paper's section 3).
@@ -320,5 +372,5 @@ fn fill_by_raster(graph: &mut Graph, frame: &Frame<'_>, layout: &Layout) -> Resu
     let depth = pass.stencil(depth, Load::Keep);
     fill.draw(frame, &mut pass);
     pass.finish();
-    Ok(Lists { blocks, count, depth })
+    Ok(Lists { blocks, count, samples: Samples::Depth(depth) })
 }

@@ -17,7 +17,7 @@ uint source_background;     // samples without a surface
 
 // Bounds of what a tile's lights must reach, from the depth buffer.
 float source_distance(ivec2 pixel, uint i) {
-    float depth = FETCH_SAMPLE(gbuffer_depth, pixel, i).r;
+    float depth = SAMPLE_DEPTH(pixel, i);
     return depth == 0.0 ? -1.0 : distance_from_depth(depth);
 }
 
@@ -57,7 +57,7 @@ void source_begin(ivec2 pixel) {
 uint samples_without_surface() {
     uint count = 0u;
     for (uint i = 0u; i < SAMPLES; ++i) {
-        count += FETCH_SAMPLE(gbuffer_depth, source_pixel, i).r == 0.0 ? 1u : 0u;
+        count += SAMPLE_DEPTH(source_pixel, i) == 0.0 ? 1u : 0u;
     }
     return count;
 }
@@ -85,12 +85,12 @@ bool source_next(out Surface s, out uint weight) {
         float distance_m = uintBitsToFloat(blocks[distance_word(block)]);
         s.position_ws = position_from_depth(ndc_from_pixel(uvec2(source_pixel)), depth_from_distance(distance_m));
     } else {
-        float depth = FETCH_SAMPLE(gbuffer_depth, source_pixel, sample_index).r;
+        float depth = SAMPLE_DEPTH(source_pixel, sample_index);
         vec2 ndc = ndc_from_sample(source_pixel, sample_index);
         if (KEEPS_ALL != 0u && weight == SAMPLES && SAMPLES <= 8u) {
             // Depth is affine on the screen, and this sample stands opposite to sample 0: between them is the centre.
             int opposite = SAMPLES == 4u ? 3 : 1;
-            depth = 0.5 * (FETCH_SAMPLE(gbuffer_depth, source_pixel, 0).r + FETCH_SAMPLE(gbuffer_depth, source_pixel, opposite).r);
+            depth = 0.5 * (SAMPLE_DEPTH(source_pixel, 0u) + SAMPLE_DEPTH(source_pixel, uint(opposite)));
             ndc = ndc_from_pixel(uvec2(source_pixel));
         }
         s.position_ws = position_from_depth(ndc, depth);

@@ -13,6 +13,19 @@ layout(constant_id = 8) const uint SAMPLES = 4u;
 #define FETCH_SAMPLE(image, pixel, i) texelFetch(image, pixel, int(i))
 #endif
 
+#ifdef SAMPLES_IN_KEYS
+// Two words a sample (compute_raster/mod.rs): the complement of its triangle's place in the order of draws, its depth.
+layout(set = 0, binding = 8, scalar) readonly buffer SampleKeys {
+    uint sample_keys[];
+};
+uint sample_word(ivec2 pixel, uint i) {
+    return ((uint(pixel.y) * frame.size_px.x + uint(pixel.x)) * SAMPLES + i) * 2u;
+}
+#define SAMPLE_DEPTH(pixel, i) uintBitsToFloat(sample_keys[sample_word(pixel, i) + 1u])
+#else
+#define SAMPLE_DEPTH(pixel, i) FETCH_SAMPLE(gbuffer_depth, pixel, i).r
+#endif
+
 // Where sample i stands, pixels from the pixel's upper left corner.
 vec2 sample_location(uint i) {
     const vec2 LOCATIONS[31] = vec2[](

@@ -6,7 +6,9 @@
 #include "heat.glsl"
 #include "multisample/samples.glsl"
 
+#ifndef SAMPLES_IN_KEYS
 layout(set = 0, binding = 8) uniform SAMPLED_IMAGE gbuffer_depth;
+#endif
 
 #if defined(SOURCE_DEDUP)
 #include "multisample/source_dedup.glsl"

@@ -44,9 +44,10 @@ enum What {
     GBuffer,
     /// The depth buffer.
     ZBuffer,
-    /// Triangle IDs from which the lists are filled; the paper's fill has none.
-    TriangleIds,
-    /// G-buffer, depth buffer and triangle IDs.
+    /// From what lists are filled in compute: triangle IDs of samples, or keys of depth and triangle with the queues of
+    /// their rasterisation. The paper's fill has none.
+    Visibility,
+    /// G-buffer, depth buffer and visibility.
     Total,
     /// The radiance that lighting writes, which the paper leaves out of its table.
     Output,
@@ -66,7 +67,7 @@ impl Paper {
             What::GBuffer => self.gbuffer_mib,
             What::ZBuffer => self.zbuffer_mib,
             What::Total => Some(self.total_mib),
-            What::TriangleIds | What::Output => None,
+            What::Visibility | What::Output => None,
         }
     }
 }
@@ -370,14 +371,14 @@ fn columns(base: &Renderer, sample_counts: &[u32]) -> Result<Vec<Column>, Failur
 fn list_note(is_papers: bool, depth_bytes: u64, blocks: Blocks) -> String {
     match (is_papers, depth_bytes) {
         (false, _) if blocks == Blocks::Min => {
-            "blocks of 144 bits (with the sample's distance), and 4 bytes of triangle ID; one sample a pixel is rasterised, as there is no block for another".to_owned()
+            "blocks of 144 bits (with the sample's distance); one sample a pixel is rasterised, as there is no block for another".to_owned()
         }
         (true, 4) => "blocks of 112 bits, depth and stencil 4 bytes a sample".to_owned(),
         (true, _) => format!(
             "blocks of 112 bits; the device has no depth with stencil in 4 bytes, a sample takes {depth_bytes}: the 4 of depth are compared"
         ),
         (false, _) => {
-            "blocks of 144 bits (with the sample's distance), and 4 bytes of triangle ID a sample".to_owned()
+            "blocks of 144 bits (with the sample's distance); visibility is depth and triangle ID, 4 bytes each a sample, or where compute rasterises keys of 8 that hold both, and queues".to_owned()
         }
     }
 }
@@ -427,25 +428,37 @@ fn single_sample_layout(base: &Renderer) -> Result<RunResult, Failure> {
     Ok(result)
 }
 
-/// What an image or buffer of a technique is, and the bytes that its format takes; none for what the table does not know.
-fn part(
-    name: &str,
-    samples: u64,
+/// Numbers that the sizes of a technique's images and buffers follow from.
+struct Sizes {
     pixels: u64,
-    blocks: u64,
+    /// Samples a pixel that are rasterised.
+    samples: u64,
     depth_bytes: u64,
+    /// Dynamic blocks.
+    blocks: u64,
+    /// Bytes of two interleaved blocks.
     pair_bytes: u64,
-) -> Option<(What, u64)> {
-    let (technique, part) = name.split_once('/')?;
-    Some(match (technique, part) {
-        (_, "base color" | "normal") => (What::GBuffer, pixels * samples * 4),
-        ("deferred", "roughness") => (What::GBuffer, pixels),
-        (_, "roughness") => (What::GBuffer, pixels * samples * 4),
-        (_, "depth") => (What::ZBuffer, pixels * samples * depth_bytes),
-        (_, "ids") => (What::TriangleIds, pixels * samples * 4),
-        (_, "blocks") => (What::GBuffer, (pixels + blocks).div_ceil(2) * pair_bytes),
+    /// Capacities of the queues of rasterisation in compute.
+    large_triangles: u64,
+    tile_jobs: u64,
+}
+
+/// What an image or buffer of a technique is, and the bytes that its format takes; none for what the table does not know.
+fn part(name: &str, sizes: &Sizes) -> Option<(What, u64)> {
+    let all_samples = sizes.pixels * sizes.samples;
+    Some(match name.split_once('/')? {
+        (_, "base color" | "normal") => (What::GBuffer, all_samples * 4),
+        ("deferred", "roughness") => (What::GBuffer, sizes.pixels),
+        (_, "roughness") => (What::GBuffer, all_samples * 4),
+        (_, "depth") => (What::ZBuffer, all_samples * sizes.depth_bytes),
+        (_, "ids") => (What::Visibility, all_samples * 4),
+        (_, "sample keys") => (What::Visibility, all_samples * 8),
+        (_, "large triangles") => (What::Visibility, sizes.large_triangles * 4),
+        (_, "tile jobs") => (What::Visibility, sizes.tile_jobs * 8),
+        (_, "large count" | "job count") => (What::Visibility, 8),
+        (_, "blocks") => (What::GBuffer, (sizes.pixels + sizes.blocks).div_ceil(2) * sizes.pair_bytes),
         (_, "block count") => (What::GBuffer, 8),
-        (_, "accumulation" | "radiance") => (What::Output, pixels * 8),
+        (_, "accumulation" | "radiance") => (What::Output, sizes.pixels * 8),
         _ => return None,
     })
 }
@@ -458,25 +471,28 @@ fn rasterised_samples(column: &Column, result: &RunResult, blocks: u64) -> u64 {
 
 /// The images and buffers of a result that the table knows.
 fn resources(column: &Column, result: &RunResult, pixels: u64) -> Vec<Resource> {
-    // Two interleaved blocks: 10 bytes of content each with a pointer of 4, and 4 of distance.
-    let pair_bytes = if result.params.get("position").is_some_and(|p| p == "distance") { 36 } else { 28 };
-    let blocks = counter(result, "blocks_capacity").unwrap_or(0);
-    let samples = rasterised_samples(column, result, blocks);
-    result
-        .memory
-        .iter()
-        .flat_map(|memory| &memory.buffers)
-        .filter_map(|buffer| {
-            let (what, layout_bytes) =
-                part(&buffer.name, samples, pixels, blocks, column.depth_bytes, pair_bytes)?;
-            Some(Resource { name: buffer.name.clone(), bytes: buffer.bytes, layout_bytes, what })
-        })
-        .collect()
+    let capacity = |name: &str| counter(result, &format!("{name}_capacity")).unwrap_or(0);
+    let blocks = capacity("blocks");
+    let sizes = Sizes {
+        pixels,
+        samples: rasterised_samples(column, result, blocks),
+        depth_bytes: column.depth_bytes,
+        blocks,
+        // 10 bytes of content each with a pointer of 4, and 4 of distance.
+        pair_bytes: if result.params.get("position").is_some_and(|p| p == "distance") { 36 } else { 28 },
+        large_triangles: capacity("large_triangles"),
+        tile_jobs: capacity("tile_jobs"),
+    };
+    let resource = |buffer: &Buffer| {
+        let (what, layout_bytes) = part(&buffer.name, &sizes)?;
+        Some(Resource { name: buffer.name.clone(), bytes: buffer.bytes, layout_bytes, what })
+    };
+    result.memory.iter().flat_map(|memory| &memory.buffers).filter_map(resource).collect()
 }
 
 fn cells(column: &Column, result: &RunResult, pixels: u64) -> Vec<Cell> {
     let resources = resources(column, result, pixels);
-    [What::GBuffer, What::ZBuffer, What::TriangleIds, What::Total, What::Output]
+    [What::GBuffer, What::ZBuffer, What::Visibility, What::Total, What::Output]
         .into_iter()
         .map(|what| cell(column, result, what, &resources, pixels))
         .collect()
@@ -565,7 +581,7 @@ fn row_name(what: What) -> &'static str {
     match what {
         What::GBuffer => "G-buffer",
         What::ZBuffer => "Z-buffer",
-        What::TriangleIds => "triangle IDs",
+        What::Visibility => "visibility",
         What::Total => "total",
         What::Output => "output",
     }
@@ -742,7 +758,7 @@ mod tests {
             (of(&found, What::Output).bytes, of(&found, What::Output).holds()),
             (Some(PIXELS * 8), None)
         );
-        assert_eq!(of(&found, What::TriangleIds).bytes, Some(0));
+        assert_eq!(of(&found, What::Visibility).bytes, Some(0));
         // A quarter of the pixels: a quarter of the paper's figure.
         let quarter = cells(&column(Blocks::Max, 4), &result(PIXELS / 4, 3 * PIXELS / 4, 4, 0), PIXELS / 4);
         assert!(of(&quarter, What::Total).deviation_percent.expect("there").abs() < 0.01);
@@ -782,6 +798,27 @@ mod tests {
             (rasterised_samples(&column, &result, 0), rasterised_samples(&column, &result, 1)),
             (1, 4)
         );
+    }
+
+    #[test]
+    fn keys_stand_for_depth_and_triangle() {
+        let sizes = Sizes {
+            pixels: 100,
+            samples: 4,
+            depth_bytes: 4,
+            blocks: 3,
+            pair_bytes: 36,
+            large_triangles: 7,
+            tile_jobs: 5,
+        };
+        let of = |name: &str| part(name, &sizes);
+        assert_eq!(of("gbuffer-list/sample keys"), Some((What::Visibility, 3200)));
+        assert_eq!(of("gbuffer-list/large triangles"), Some((What::Visibility, 28)));
+        assert_eq!(of("gbuffer-list/tile jobs"), Some((What::Visibility, 40)));
+        assert_eq!(of("gbuffer-list/blocks"), Some((What::GBuffer, 52 * 36)));
+        assert_eq!(of("deferred/roughness"), Some((What::GBuffer, 100)));
+        assert_eq!(of("deferred-ssaa/roughness"), Some((What::GBuffer, 1600)));
+        assert_eq!(of("bench/unknown"), None);
     }
 
     #[test]

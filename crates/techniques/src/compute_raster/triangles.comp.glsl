@@ -1,0 +1,96 @@
+// Rasterises small triangles, a thread each, and lists the others. Eight groups share a draw of at most 1,024 triangles.
+//
+// In: the scene, draw commands. Out: SampleKeys; LargeTriangles: place in the order of draws. Dispatch: draws of a bucket
+// x 8. ALPHA_MASK tests the alpha of masked surfaces.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "compute_raster/raster.glsl"
+
+layout(local_size_x = 128) in;
+layout(set = 0, binding = 10, scalar) readonly buffer DrawCounts {
+    uint draw_counts[];     // a bucket
+};
+layout(set = 0, binding = 11, scalar) writeonly buffer LargeTriangles {
+    uint large_triangles[];
+};
+layout(set = 0, binding = 12, scalar) buffer LargeCount {
+    uint large_needed;
+    uint large_dropped;
+};
+layout(constant_id = 10) const uint LARGE_CAPACITY = 0u;
+layout(push_constant, scalar) uniform Push {
+    uint bucket;
+    uint first_command;
+};
+
+// Side of the box of a small triangle, pixels: longer loops of one thread cost more than a group's turn at the triangle.
+// 32-bit edge functions hold up to 64 pixels.
+layout(constant_id = 11) const uint SMALL_PX = 16u;
+
+void rasterize_small(ScreenTriangle t, ivec2 first, ivec2 last, uint order, uint draw) {
+    DepthPlane plane = depth_plane(t);
+    ivec2 d0 = t.p1 - t.p0, d1 = t.p2 - t.p1, d2 = t.p0 - t.p2;
+    ivec3 bias = ivec3(edge_bias(t.p0, t.p1), edge_bias(t.p1, t.p2), edge_bias(t.p2, t.p0));
+    for (int y = first.y; y <= last.y; ++y) {
+        for (int x = first.x; x <= last.x; ++x) {
+            ivec2 corner = ivec2(x, y) * SUBPIXELS;
+            ivec2 q0 = corner - t.p0, q1 = corner - t.p1, q2 = corner - t.p2;
+            ivec3 edge = bias + ivec3(d0.x * q0.y - d0.y * q0.x, d1.x * q1.y - d1.y * q1.x, d2.x * q2.y - d2.y * q2.x);
+            // Most that each grows within the pixel.
+            ivec3 gain = SUBPIXELS * (max(ivec3(d0.x, d1.x, d2.x), 0) + max(-ivec3(d0.y, d1.y, d2.y), 0));
+            if (any(lessThan(edge + gain, ivec3(0)))) {
+                continue;
+            }
+            uint covered = 0u;
+            for (uint i = 0u; i < SAMPLES; ++i) {
+                ivec2 s = ivec2(sample_location(i) * float(SUBPIXELS));
+                ivec3 at = edge + ivec3(d0.x, d1.x, d2.x) * s.y - ivec3(d0.y, d1.y, d2.y) * s.x;
+                covered |= all(greaterThanEqual(at, ivec3(0))) ? 1u << i : 0u;
+            }
+            if (covered != 0u) {
+                keep_nearest(ivec2(x, y), covered, t, plane, order, draw);
+            }
+        }
+    }
+}
+
+void main() {
+    if (gl_WorkGroupID.x >= draw_counts[bucket]) {
+        return;
+    }
+    uint command = first_command + gl_WorkGroupID.x;
+    RasterDraw d = load_raster_draw(command);
+    uint triangles = draw_commands[command * 5u] / 3u;
+    uint triangle = gl_WorkGroupID.y * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
+    if (triangle >= triangles) {
+        return;
+    }
+    vec4 c0, c1, c2;
+    vertices_clip(d.data, triangle_vertices(triangle, d.data), c0, c1, c2);
+    bool crosses = before_near_plane(c0) || before_near_plane(c1) || before_near_plane(c2);
+    bool is_large = crosses;
+    ScreenTriangle t;
+    ivec2 first, last;
+    if (!crosses) {
+        if (!screen_triangle(d, c0, c1, c2, 0u, t)) {
+            return;
+        }
+        pixel_box(t, first, last);
+        if (any(greaterThan(first, last))) {
+            return;
+        }
+        ivec2 size = (max(t.p0, max(t.p1, t.p2)) - min(t.p0, min(t.p1, t.p2))) >> 8;
+        is_large = max(size.x, size.y) >= int(SMALL_PX);
+    }
+    uint order = command << TRIANGLE_BITS | triangle;
+    if (!is_large) {
+        rasterize_small(t, first, last, order, d.draw);
+    } else {
+        uint place = atomicAdd(large_needed, 1u);
+        if (place < LARGE_CAPACITY) {
+            large_triangles[place] = order;
+        } else {
+            atomicAdd(large_dropped, 1u);
+        }
+    }
+}
