@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::parser::ValueSource;
+use clap::{ArgMatches, Args, FromArgMatches, Parser, Subcommand, ValueEnum};
 
 use crate::failure::Failure;
 
@@ -134,13 +135,18 @@ pub struct CompareArgs {
 /// Arguments of `bench`.
 #[derive(Debug, Args)]
 pub struct BenchArgs {
-    /// Experiment: speed (start-up, memory and frame times), or all
-    #[arg(value_name = "EXPERIMENT|all")]
+    /// Which options were given: experiments have sizes of their own.
+    #[command(flatten)]
+    pub given: Given,
+    #[arg(value_name = "EXPERIMENT|all", help = crate::commands::bench::help())]
     pub experiment: String,
-    /// Scenes
+    /// Share of the experiment's width and height; triangles go by its square
+    #[arg(long, value_name = "F", default_value_t = 1.0, value_parser = share)]
+    pub scale: f64,
+    /// Scenes; msaa-table2 has three of its own
     #[arg(long, value_name = "SCENE,SCENE…", value_delimiter = ',', default_value = DEFAULT_SCENE)]
     pub scenes: Vec<String>,
-    /// Numbers of seeded lights
+    /// Numbers of seeded lights; msaa-table2 has its own, 5 and 50
     #[arg(long, value_name = "N,N…", value_delimiter = ',', default_value = "100,1000", value_parser = clap::value_parser!(u32).range(0..=LIGHTS_MAX))]
     pub light_counts: Vec<u32>,
     /// Techniques, by their ids, or all
@@ -156,6 +162,50 @@ pub struct BenchArgs {
     pub json: JsonArgs,
     #[command(flatten)]
     pub common: CommonArgs,
+}
+
+/// Options of `bench` that were on the command line, so that experiments know their own from what was asked for.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Given {
+    /// `--width` or `--height`.
+    pub size: bool,
+    /// `--samples`.
+    pub samples: bool,
+    /// `--scenes`.
+    pub scenes: bool,
+    /// `--light-counts`.
+    pub light_counts: bool,
+    /// `--techniques`.
+    pub techniques: bool,
+}
+
+/// Reads nothing of its own: it looks where the values of others come from, and so stands before them in its struct.
+impl FromArgMatches for Given {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
+        let given = |id: &str| matches.value_source(id) == Some(ValueSource::CommandLine);
+        Ok(Given {
+            size: given("width") || given("height"),
+            samples: given("samples"),
+            scenes: given("scenes"),
+            light_counts: given("light_counts"),
+            techniques: given("techniques"),
+        })
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
+        *self = Given::from_arg_matches(matches)?;
+        Ok(())
+    }
+}
+
+impl Args for Given {
+    fn augment_args(command: clap::Command) -> clap::Command {
+        command
+    }
+
+    fn augment_args_for_update(command: clap::Command) -> clap::Command {
+        command
+    }
 }
 
 /// Arguments of `completions`.
@@ -288,6 +338,13 @@ fn samples(text: &str) -> Result<u32, String> {
     match text.parse() {
         Ok(samples @ (1 | 2 | 4 | 8 | 16)) => Ok(samples),
         _ => Err("expected 1, 2, 4, 8 or 16".to_owned()),
+    }
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(share) if share > 0.0 && share <= 1.0 => Ok(share),
+        _ => Err("expected a number above 0, at most 1".to_owned()),
     }
 }
 

@@ -87,7 +87,8 @@ fn bad_usage_is_one_line_and_exit_code_2() {
         2,
         &["view", "normals", "final", "invocations"],
     );
-    refused(&["bench", "everything"], 2, &["everything", "speed"]);
+    refused(&["bench", "everything"], 2, &["everything", "speed", "msaa-table1"]);
+    refused(&["bench", "speed", "--scale", "0"], 2, &["--scale", "0", "at most 1"]);
     refused(&["completions", "csh"], 2, &["csh"]);
     refused(&["render", "-o", "a.png"], 2, &["--technique"]);
     let exr = ["render", "--technique", "forward", "-o", "a.exr", "--post", "smaa"];
@@ -286,6 +287,95 @@ fn samples_that_the_device_lacks_are_told() {
         2,
         &["--samples", lacking, "one of: 1"],
     );
+}
+
+#[test]
+fn bench_msaa_table1_has_all_cells_beside_the_papers() {
+    if !has_device() {
+        return;
+    }
+    let folder = folder();
+    let arguments = ["bench", "msaa-table1", "--scale", "0.1", "--report", "r", "--json", "-"];
+    let output = run_in(folder.path(), &arguments);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let found = json(&output);
+    assert_eq!((&found["schema"], &found["experiment"]), (&1.into(), &"msaa-table1".into()));
+    let rows = found["rows"].as_array().expect("a list");
+    let samples: Vec<_> = rows.iter().map(|row| row["settings"]["samples"].as_u64()).collect();
+    assert_eq!(samples, [Some(1), Some(4), Some(8)]);
+    let cells: Vec<&Value> = rows.iter().flat_map(|row| row["cells"].as_array().expect("a list")).collect();
+    let paper = [
+        ("none", [23.73, 7.91, 31.64]),
+        ("MSAA 4x", [94.92, 31.64, 126.56]),
+        ("MSAA 8x", [189.84, 63.28, 253.12]),
+        ("list 4x min", [27.69, 31.64, 59.33]),
+        ("list 4x max", [110.74, 31.64, 142.38]),
+        ("list 8x min", [27.69, 63.28, 90.97]),
+        ("list 8x max", [221.48, 63.28, 284.76]),
+    ];
+    for (column, figures) in paper {
+        for (row, figure) in ["g-buffer", "z-buffer", "total"].into_iter().zip(figures) {
+            let cell = cells
+                .iter()
+                .find(|cell| cell["column"] == column && cell["row"] == row)
+                .unwrap_or_else(|| panic!("no cell {column} {row}"));
+            let paper_mib = cell["paper_mib"].as_f64().expect("a number");
+            assert!((paper_mib - figure * 0.01).abs() < 1e-6, "{cell}");
+            match cell["status"].as_str() {
+                // A tenth of the size: a page more or less weighs a hundred times as much.
+                Some("ok") => {
+                    let off = cell["deviation_without_granularity_percent"].as_f64().expect("a number");
+                    assert!(off.abs() < 3.0, "{cell}");
+                    assert!(cell["bytes"].as_u64() >= cell["layout_bytes"].as_u64(), "{cell}");
+                }
+                _ => assert!(cell["status"] == "unavailable" && cell["reason"].is_string(), "{cell}"),
+            }
+        }
+    }
+    for used in ["list 4x used", "default list 4x used"] {
+        assert!(cells.iter().any(|cell| cell["column"] == used), "no cell {used}");
+    }
+    let html = fs::read_to_string(folder.path().join("r/report.html")).expect("written");
+    assert!(html.contains("MSAA 4x") && html.contains("G-buffer"));
+}
+
+#[test]
+fn bench_of_anti_aliasing_runs_on_small_images() {
+    if !has_device() {
+        return;
+    }
+    let folder = folder();
+    let common =
+        ["--scenes", "builtin:edge", "--scale", "0.05", "--samples", "4", "--frames", "1", "--json", "-"];
+
+    let table2 = [
+        &["bench", "msaa-table2", "--light-counts", "5", "--techniques", "deferred-ssaa,gbuffer-list"][..],
+        &common,
+    ]
+    .concat();
+    let output = run_in(folder.path(), &table2);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let found = json(&output);
+    let row = &found["rows"][0];
+    assert_eq!((&row["settings"]["width"], &row["scene"]["lights"]), (&96.into(), &5.into()));
+    let columns: Vec<_> =
+        row["cells"].as_array().expect("a list").iter().map(|cell| cell["column"].clone()).collect();
+    assert!(columns.contains(&"gbuffer-list 4x, edges".into()), "{columns:?}");
+    assert!(found["duels"][0]["ratio"].is_number(), "{}", found["duels"]);
+
+    let quality = [&["bench", "antialiasing", "--report", "r"][..], &common].concat();
+    let output = run_in(folder.path(), &quality);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let found = json(&output);
+    let rows = found["rows"].as_array().expect("a list");
+    let posts: Vec<_> = rows.iter().map(|row| row["settings"]["post"].clone()).collect();
+    assert_eq!(posts, ["none", "fxaa", "smaa", "sraa", "none"]);
+    for cell in rows.iter().flat_map(|row| row["cells"].as_array().expect("a list")) {
+        assert!(cell["flip"].is_number() && cell["psnr_db"].is_number(), "{cell}");
+    }
+    assert_eq!(found["post"].as_array().map(Vec::len), Some(3));
+    let html = fs::read_to_string(folder.path().join("r/report.html")).expect("written");
+    assert!(html.contains("below forward 1x") && html.contains("data:image/png;base64,"));
 }
 
 /// The folder of reference scenes, beside the repository.

@@ -1,14 +1,15 @@
-//! `afterlight bench`
+//! `bench speed`: start-up time and memory of a process, frame times of techniques for several numbers of lights.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Instant;
 
 use afterlight_measure::{Run, SCHEMA, Spread};
-use afterlight_report::{Section, bytes_text, ms_text};
+use afterlight_report::{bytes_text, ms_text};
 use afterlight_techniques::Params;
 use serde::Serialize;
 
+use super::{Experiment, Outcome, Part, at_size, to_json};
 use crate::args::{BenchArgs, CommonArgs};
 use crate::commands::compare::{self, Compared};
 use crate::failure::Failure;
@@ -17,11 +18,9 @@ use crate::progress::Progress;
 use crate::session::{self, Chosen, Session, ms_since};
 use crate::text;
 
-/// Experiments by name, with what each is.
-const EXPERIMENTS: &[(&str, &str)] = &[(
-    "speed",
-    "start-up time and memory of a process, frame times of every technique for several numbers of lights",
-)];
+/// The experiment.
+pub(super) const EXPERIMENT: Experiment =
+    Experiment { name: "speed", summary: "start-up, memory and frame times", run };
 
 /// Times that a process is started for a start-up figure.
 const START_UPS: usize = 3;
@@ -55,37 +54,26 @@ struct StartUp {
     peak_resident_bytes: Option<u64>,
 }
 
-pub fn run(args: &BenchArgs) -> Result<(), Failure> {
-    let known = |name: &str| EXPERIMENTS.iter().any(|(id, _)| *id == name);
-    if args.experiment != "all" && !known(&args.experiment) {
-        let names: Vec<&str> = EXPERIMENTS.iter().map(|(id, _)| *id).collect();
-        let expected = format!("one of: {}, all", names.join(", "));
-        return Err(Failure::option("EXPERIMENT", format!("{:?}", args.experiment), expected));
-    }
-    args.common.check()?;
-    args.json.check()?;
-    if let Some(folder) = &args.report {
-        output::make_folder(folder)?;
-    }
-    speed(args)
-}
-
-fn speed(args: &BenchArgs) -> Result<(), Failure> {
-    let common = &args.common;
-    let progress = Progress::new(common.quiet);
+fn run(args: &BenchArgs, progress: &Progress) -> Result<Outcome, Failure> {
+    let samples = args.common.samples;
+    let common = &CommonArgs {
+        samples,
+        view: args.common.view.clone(),
+        ..at_size(args, (args.common.width, args.common.height))
+    };
     let chosen = session::choose("--techniques", &args.techniques, &common.set)?;
     let mut bench = Bench { schema: SCHEMA, experiment: "speed", start_up: Vec::new(), rows: Vec::new() };
     let mut pictures = Vec::new();
     for scene in &args.scenes {
         let lights = args.light_counts.first().copied().unwrap_or(0);
         let first = chosen.last().map_or("forward", |one| one.id());
-        bench.start_up.push(start_up(scene, first, lights, common, &progress)?);
+        bench.start_up.push(start_up(scene, first, lights, common, progress)?);
         if !common.quiet {
             output::tell(&args.json, &start_up_text(&bench.start_up[bench.start_up.len() - 1]));
         }
         for lights in &args.light_counts {
             let common = CommonArgs { lights: *lights, ..common.clone() };
-            let session = Session::open(scene, &common, false, &progress)?;
+            let session = Session::open(scene, &common, false, progress)?;
             let reference =
                 Chosen { technique: session::technique("reference", "forward")?, params: Params::default() };
             let with_pictures = args.report.is_some();
@@ -96,7 +84,7 @@ fn speed(args: &BenchArgs) -> Result<(), Failure> {
                 reference,
                 args.frames,
                 with_pictures,
-                &progress,
+                progress,
             )?;
             if !common.quiet {
                 output::tell(&args.json, &compare::tables(&run));
@@ -106,27 +94,25 @@ fn speed(args: &BenchArgs) -> Result<(), Failure> {
             pictures.push(drawn);
         }
     }
-    output::json(&args.json, &bench)?;
-    if let Some(folder) = &args.report {
-        let sections = bench
-            .rows
-            .iter()
-            .zip(pictures)
-            .map(|(run, pictures)| Section {
-                heading: format!("{}, {} lights", run.scene.name, run.scene.lights),
-                note: bench
-                    .start_up
-                    .iter()
-                    .find(|one| one.scene == run.scene.name)
-                    .map_or_else(String::new, start_up_text),
-                run,
-                pictures,
-            })
-            .collect();
-        let path = compare::write_report(folder, "Speed and memory", sections, &output::json_text(&bench)?)?;
-        output::tell(&args.json, &format!("report: {}\n", path.display()));
-    }
-    bench.rows.iter().try_for_each(compare::verdict)
+    let failed = bench.rows.iter().find_map(|run| compare::verdict(run).err());
+    let json = to_json(&bench)?;
+    let sections = bench
+        .rows
+        .into_iter()
+        .zip(pictures)
+        .map(|(run, pictures)| Part {
+            heading: format!("{}, {} lights", run.scene.name, run.scene.lights),
+            note: bench
+                .start_up
+                .iter()
+                .find(|one| one.scene == run.scene.name)
+                .map_or_else(String::new, start_up_text),
+            run,
+            pictures,
+        })
+        .collect();
+    let failed = failed.map(|failure| failure.lines().join("; "));
+    Ok(Outcome { title: "Speed and memory", json, sections, failed })
 }
 
 /// Starts this program anew to render one image, several times.
