@@ -82,7 +82,11 @@ fn bad_usage_is_one_line_and_exit_code_2() {
     refused(&["compare", "--post", "blur"], 2, &["--post", "blur", "fxaa"]);
     refused(&["compare", "--shadows", "pcss"], 2, &["--shadows", "pcss"]);
     refused(&["compare", "--indirect", "rsm"], 2, &["--indirect", "rsm"]);
-    refused(&["compare", "--view", "normals"], 2, &["--view", "normals", "final"]);
+    refused(
+        &["render", "builtin:edge", "--technique", "forward", "--view", "normals", "-o", "unused.png"],
+        2,
+        &["view", "normals", "final", "invocations"],
+    );
     refused(&["bench", "everything"], 2, &["everything", "speed"]);
     refused(&["completions", "csh"], 2, &["csh"]);
     refused(&["render", "-o", "a.png"], 2, &["--technique"]);

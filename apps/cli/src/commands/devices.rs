@@ -49,6 +49,25 @@ fn optional(features: &Features) -> Vec<(&'static str, bool)> {
     ]
 }
 
+/// What techniques do where the device lacks a feature that they would use.
+fn fallbacks(features: &Features) -> Vec<(&'static str, &'static str)> {
+    let multisampled_integer = features.sample_counts_integer & !1 != 0;
+    let all = [
+        (
+            features.post_depth_coverage,
+            "post-depth coverage",
+            "gbuffer-list fills its lists in compute, from the triangle IDs of the samples",
+        ),
+        (multisampled_integer, "multisampled integer colour", "triangle IDs of samples are stored as RGBA8"),
+        (
+            features.buffer_int64_atomics && features.shader_int64,
+            "64-bit buffer atomics",
+            "triangles are found by raster passes alone",
+        ),
+    ];
+    all.into_iter().filter(|(is, ..)| !is).map(|(_, lacks, instead)| (lacks, instead)).collect()
+}
+
 fn device_json(info: &DeviceInfo, features: &Features, missing: &[&str]) -> Value {
     let techniques: Vec<Value> = registry()
         .iter()
@@ -71,6 +90,10 @@ fn device_json(info: &DeviceInfo, features: &Features, missing: &[&str]) -> Valu
         "usable": missing.is_empty(),
         "missing": missing,
         "features": optional,
+        "fallbacks": fallbacks(features)
+            .into_iter()
+            .map(|(lacks, instead)| json!({ "lacks": lacks, "instead": instead }))
+            .collect::<Vec<_>>(),
         "subgroup_size": features.subgroup_size,
         "samples": {
             "color": counts(features.sample_counts_color),
@@ -106,6 +129,9 @@ fn device_text(info: &DeviceInfo, features: &Features, missing: &[&str]) -> Stri
         list(features.sample_counts_depth),
         list(features.sample_counts_integer)
     );
+    for (lacks, instead) in fallbacks(features) {
+        let _ = writeln!(text, "   without {lacks}: {instead}");
+    }
     for technique in registry() {
         let lacks = technique.missing(features);
         let verdict = match (missing.is_empty(), lacks.is_empty()) {

@@ -7,6 +7,7 @@
 use afterlight_graph::{BufferHandle, Graph};
 
 use crate::{
+    Info,
     error::TechniqueError,
     frame::Frame,
     params::{ParamInfo, ParamKind},
@@ -23,6 +24,14 @@ const LIST_GROUPS: u32 = 4096;
 /// Triangles, and threads, of a group: `local_size_x` in `triangles.comp.glsl`.
 const GROUP_TRIANGLES: u32 = 128;
 
+/// Who finds the triangles of a technique that reads triangle IDs.
+pub const VISIBILITY: ParamInfo = ParamInfo {
+    key: "visibility",
+    summary: "who finds the triangles that show: a raster pass, or rasterisation in compute; auto: compute on a GPU that has 64-bit buffer atomics",
+    kind: ParamKind::Choice { values: &["auto", "raster", "compute"] },
+    default: "auto",
+};
+
 /// Which triangles one thread rasterises.
 pub const SMALL: ParamInfo = ParamInfo {
     key: "small-px",
@@ -31,20 +40,31 @@ pub const SMALL: ParamInfo = ParamInfo {
     default: "16",
 };
 
-/// Whether a device can run the stage.
-pub fn is_supported(features: &afterlight_graph::gpu::Features) -> bool {
-    features.buffer_int64_atomics && features.shader_int64
-}
-
-/// Whether the stage is expected to be faster than a raster pass: measured on an NVIDIA H200, where 8 samples of Sponza at
+/// Whether a frame of the technique is rasterised in compute, by its parameter [`VISIBILITY`].
+///
+/// `auto` expects that to be faster on everything but a CPU: measured on an NVIDIA H200, where 8 samples of Sponza at
 /// 1920×1080 take 2.2 ms instead of 8.6, and on lavapipe, whose raster pass is its own vectorised code, 1,860 ms instead of
-/// 164 at 4 samples of 640×360. So: on everything but a CPU.
-pub fn is_faster(frame: &Frame<'_>) -> bool {
-    is_supported(frame.features()) && !frame.is_cpu()
+/// 164 at 4 samples of 640×360.
+///
+/// # Errors
+/// `compute` on a device that lacks what it takes.
+pub fn is_chosen(frame: &Frame<'_>, info: &Info) -> Result<bool, TechniqueError> {
+    let is_supported = frame.features().buffer_int64_atomics && frame.features().shader_int64;
+    match frame.params.text(info, VISIBILITY.key) {
+        "compute" if !is_supported => Err(TechniqueError::Unavailable {
+            technique: info.id,
+            missing:
+                "64-bit integers and buffer atomics for visibility=compute (visibility=raster does without)"
+                    .to_owned(),
+        }),
+        "compute" => Ok(true),
+        "auto" => Ok(is_supported && !frame.is_cpu()),
+        _ => Ok(false),
+    }
 }
 
 /// Declares the passes that rasterise the draws in view at `samples` samples a pixel. Returns a key a sample, those of a pixel
-/// side by side; triangles below `small_px` pixels take a thread each. Rows from the top: bits 63 to 32 depth (reversed, 0: no surface), bits 31 to 0 the complement of command
+/// side by side; triangles below [`SMALL`] pixels take a thread each. Rows from the top: bits 63 to 32 depth (reversed, 0: no surface), bits 31 to 0 the complement of command
 /// `<< 10 |` triangle, where the command is the draw's place in the buffer of draw commands.
 ///
 /// # Errors
@@ -52,10 +72,11 @@ pub fn is_faster(frame: &Frame<'_>) -> bool {
 pub fn rasterize(
     graph: &mut Graph,
     frame: &Frame<'_>,
-    technique: &str,
+    info: &Info,
     samples: u32,
-    small_px: u32,
 ) -> Result<BufferHandle, TechniqueError> {
+    let technique = info.id;
+    let small_px = frame.params.number(info, SMALL.key) as u32;
     let bytes = 8 * u64::from(frame.width_px) * u64::from(frame.height_px) * u64::from(samples);
     let limit = frame.features().max_storage_buffer_range;
     if bytes > limit {

@@ -19,10 +19,7 @@
 
 layout(local_size_x = 8, local_size_y = 8) in;
 #ifdef SAMPLES_IN_KEYS
-// VkDrawIndexedIndirectCommand: index count, 1, first index, vertex offset, draw.
-layout(set = 0, binding = 9, scalar) readonly buffer DrawCommands {
-    uint draw_commands[];
-};
+#include "compute_raster/key_ids.glsl"
 #else
 layout(set = 0, binding = 8) uniform SAMPLED_IMAGE ids;
 #endif
@@ -30,13 +27,12 @@ layout(set = 0, binding = 8) uniform SAMPLED_IMAGE ids;
 ivec2 pixel;
 
 #ifdef SAMPLES_IN_KEYS
-// The triangle's place in the order of draws: as good as its ID to tell triangles apart.
 uint sample_id(uint i) {
-    return ~sample_keys[sample_word(pixel, i)];
+    return sample_order(pixel, i);
 }
 
 uint triangle_id(uint order) {
-    return draw_commands[(order >> TRIANGLE_BITS) * 5u + 4u] << TRIANGLE_BITS | order & ((1u << TRIANGLE_BITS) - 1u);
+    return triangle_id_from_order(order);
 }
 #else
 uint triangle_id(uint id) {

@@ -3,12 +3,13 @@
 // Block i < pixels belongs to pixel i; those after are dynamic, linked from it. Blocks stand in pairs, 112 bits each:
 //
 //   word 0, 1  base colour (sRGB) and metalness, of the first and the second block
-//   word 2, 3  normal, world space, octahedral 2 x 13 bits; samples covered, less one, and one of them, 3 bits each
+//   word 2, 3  normal, world space, octahedral 2 x 13 bits; samples covered, less one, and one of them, 3 bits each. A block
+//              that holds its distance needs no sample: 15 + 14 bits and 3; with wide pointers, or one sample a pixel, 2 x 16
 //   word 4     roughness 1, roughness 2, occlusion 1, occlusion 2, 8 bits each; roughness 0 takes no light
 //   word 5, 6  pointer: 26 bits index of the next block, 0 at the end (block 0 is no dynamic one); 3 bits of samples that it
 //              covers, less one; 3 bits with one of them
 //
-// Departure: the normal gives six bits to what the pixel's own block covers, which no pointer tells. Options lengthen blocks: a
+// Departure: the normal gives bits to what the pixel's own block covers, which no pointer tells. Options lengthen blocks: a
 // wide pointer (32 bits of index; a second word: samples covered, and one of them), the view distance at the pixel's centre
 // (else positions come from the depth buffer at the sample), emission (R9G9B9E5) in scenes that have any.
 //
@@ -17,6 +18,7 @@
 #define AFTERLIGHT_LIST
 #include "packing.glsl"
 #include "tonemap.glsl"
+#include "multisample/samples.glsl"
 
 layout(constant_id = 10) const uint POINTER_WORDS = 1u;
 layout(constant_id = 11) const uint DISTANCE_WORDS = 0u;
@@ -60,16 +62,35 @@ uint pointer_block(uint pointer) {
     return POINTER_WORDS == 2u ? pointer : pointer & 0x3ffffffu;
 }
 
-// Never zero: the first coordinate is at least 1 of 8,191.
+// Bits of a normal's two coordinates; the word's others tell what the block covers.
+const bool NORMAL_FILLS_WORD = POINTER_WORDS == 2u || SAMPLES == 1u;
+const uint NORMAL_X_BITS = NORMAL_FILLS_WORD ? 16u : DISTANCE_WORDS != 0u ? 15u : 13u;
+const uint NORMAL_Y_BITS = NORMAL_FILLS_WORD ? 16u : DISTANCE_WORDS != 0u ? 14u : 13u;
+const uvec2 NORMAL_MAX = (uvec2(1u) << uvec2(NORMAL_X_BITS, NORMAL_Y_BITS)) - 1u;
+
+// Never zero: the first coordinate is at least 1.
 uint pack_normal(vec3 normal, Coverage own) {
-    vec2 oct = round((octahedral_encode(normal) * 0.5 + 0.5) * 8191.0);
-    uint bits = max(uint(oct.x), 1u) | uint(oct.y) << 13;
-    return POINTER_WORDS == 2u ? bits : bits | (own.count - 1u) << 26 | own.index << 29;
+    uvec2 oct = uvec2(round((octahedral_encode(normal) * 0.5 + 0.5) * vec2(NORMAL_MAX)));
+    uint bits = max(oct.x, 1u) | oct.y << NORMAL_X_BITS;
+    if (NORMAL_FILLS_WORD) {
+        return bits;
+    }
+    bits |= (own.count - 1u) << (NORMAL_X_BITS + NORMAL_Y_BITS);
+    return DISTANCE_WORDS != 0u ? bits : bits | own.index << 29;
 }
 
 vec3 unpack_block_normal(uint word) {
-    vec2 oct = vec2(word & 0x1fffu, word >> 13 & 0x1fffu) / 8191.0;
+    vec2 oct = vec2(word & NORMAL_MAX.x, word >> NORMAL_X_BITS & NORMAL_MAX.y) / vec2(NORMAL_MAX);
     return octahedral_decode(oct * 2.0 - 1.0);
+}
+
+// What the normal's word of a narrow block says that it covers.
+Coverage unpack_normal_coverage(uint word) {
+    if (NORMAL_FILLS_WORD) {
+        return Coverage(1u, 0u);
+    }
+    uint bits = word >> (NORMAL_X_BITS + NORMAL_Y_BITS);
+    return Coverage((bits & 7u) + 1u, DISTANCE_WORDS != 0u ? 0u : bits >> 3);
 }
 
 // Three channels of one exponent: nine bits each and five (Vulkan 1.3, "Conversion to E5B9G9R9").

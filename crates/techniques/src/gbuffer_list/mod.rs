@@ -27,12 +27,6 @@ const FILL: ParamInfo = ParamInfo {
     kind: ParamKind::Choice { values: &["compute", "raster"] },
     default: "compute",
 };
-const VISIBILITY: ParamInfo = ParamInfo {
-    key: "visibility",
-    summary: "who finds the triangles that fill=compute reads: a raster pass, or rasterisation in compute; auto: compute on a GPU that has 64-bit buffer atomics",
-    kind: ParamKind::Choice { values: &["auto", "raster", "compute"] },
-    default: "auto",
-};
 const BLOCKS: ParamInfo = ParamInfo {
     key: "blocks",
     summary: "dynamic blocks; auto: as many as the view needs, counted; fixed: what finds none is dropped and told",
@@ -72,11 +66,12 @@ static INFO: Info = Info {
         material_access: "rand",
         rates_decoupled: "n, n",
     },
-    exactness: Exactness::Exact { min_psnr_db: 50.0 },
+    // Texture gradients are analytic where compute fills.
+    exactness: Exactness::Exact { min_psnr_db: 45.0 },
     params: &[
         multisample::LIGHTS,
         FILL,
-        VISIBILITY,
+        compute_raster::VISIBILITY,
         compute_raster::SMALL,
         BLOCKS,
         POINTER,
@@ -214,10 +209,7 @@ impl Technique for GbufferList {
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let layout = Layout::new(frame)?;
         let by_raster = frame.params.text(&INFO, FILL.key) == "raster";
-        let keys = match frame.params.text(&INFO, VISIBILITY.key) {
-            "auto" => compute_raster::is_faster(frame),
-            text => text == "compute",
-        };
+        let keys = !by_raster && compute_raster::is_chosen(frame, &INFO)?;
         let lists = match (by_raster, keys) {
             (true, _) => fill_by_raster(graph, frame, &layout)?,
             (false, true) => fill_from_keys(graph, frame, &layout)?,
@@ -304,16 +296,7 @@ fn fill_by_compute(graph: &mut Graph, frame: &Frame<'_>, layout: &Layout) -> Res
 
 /// As [`fill_by_compute`], the triangles found in compute as well.
 fn fill_from_keys(graph: &mut Graph, frame: &Frame<'_>, layout: &Layout) -> Result<Lists, TechniqueError> {
-    if !compute_raster::is_supported(frame.features()) {
-        return Err(TechniqueError::Unavailable {
-            technique: INFO.id,
-            missing:
-                "64-bit integers and buffer atomics for visibility=compute (visibility=raster does without)"
-                    .to_owned(),
-        });
-    }
-    let small_px = frame.params.number(&INFO, compute_raster::SMALL.key) as u32;
-    let keys = compute_raster::rasterize(graph, frame, INFO.id, layout.samples, small_px)?;
+    let keys = compute_raster::rasterize(graph, frame, &INFO, layout.samples)?;
     let (blocks, count, flagged) = empty_lists(graph, frame, layout)?;
     let mut pass = frame.compute(graph, "gbuffer-list/fill", &frame.shader("gbuffer_list/fill.comp#keys")?);
     for (name, value) in build_constants(frame, layout) {

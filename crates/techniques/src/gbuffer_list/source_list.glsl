@@ -27,7 +27,7 @@ Coverage own_coverage(uint block, uint normal) {
         uint bits = blocks[pointer_word(block) + 1u];
         return Coverage(bits & 0xffu, bits >> 8);
     }
-    return Coverage((normal >> 26 & 7u) + 1u, normal >> 29);
+    return unpack_normal_coverage(normal);
 }
 
 void follow_pointer(uint from) {

@@ -5,7 +5,7 @@
 use afterlight_graph::{Graph, ImageHandle, Load, gpu::vk};
 
 use crate::{
-    Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError,
+    Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError, compute_raster,
     cost::{Cost, Workload, visibility_buffer},
     geometry::Surfaces,
 };
@@ -37,7 +37,7 @@ static INFO: Info = Info {
         rates_decoupled: "y, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 45.0 },
-    params: &[],
+    params: &[compute_raster::VISIBILITY, compute_raster::SMALL],
     needs: &[],
     samples: &[1],
     views: &[],
@@ -56,6 +56,9 @@ impl Technique for Visibility {
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
+        if compute_raster::is_chosen(frame, &INFO)? {
+            return shade_keys(graph, frame);
+        }
         let ids = graph.image("visibility/ids", frame.image_info(vk::Format::R32_UINT));
         let depth = graph.image("visibility/depth", frame.image_info(vk::Format::D32_SFLOAT));
         let radiance = graph.image("visibility/radiance", frame.image_info(vk::Format::R16G16B16A16_SFLOAT));
@@ -79,4 +82,17 @@ impl Technique for Visibility {
         pass.finish();
         Ok(radiance)
     }
+}
+
+/// The same from triangles that compute has found.
+fn shade_keys(graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
+    let keys = compute_raster::rasterize(graph, frame, &INFO, 1)?;
+    let radiance = graph.image("visibility/radiance", frame.image_info(vk::Format::R16G16B16A16_SFLOAT));
+    let mut pass = frame.compute(graph, "visibility/shade", &frame.shader("visibility/shade.comp#keys")?);
+    pass.constant("SAMPLES", 1u32);
+    pass.read("SampleKeys", &keys).read("DrawCommands", &frame.buffers.commands);
+    let radiance = pass.write("hdr", radiance);
+    pass.dispatch(frame.groups(16));
+    pass.finish();
+    Ok(radiance)
 }

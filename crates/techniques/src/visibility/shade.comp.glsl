@@ -3,20 +3,33 @@
 // section 4.11).
 //
 // Departure: no sort of tiles by shader, since all materials share one.
-// In: ids, R32_UINT; depth. Out: hdr, RGBA16F, radiance. Dispatch: one group a tile.
+// In: ids, R32_UINT, or the keys of compute_raster. Out: hdr, RGBA16F, radiance. Dispatch: one group a tile.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #define EXPLICIT_GRADIENTS
 #include "tiled_shading.glsl"
 #include "triangle.glsl"
 
+#ifdef SAMPLES_IN_KEYS
+#include "compute_raster/key_ids.glsl"
+
+uint visible_triangle(ivec2 pixel) {
+    uint order = sample_order(pixel, 0u);
+    return order == NO_TRIANGLE ? NO_TRIANGLE : triangle_id_from_order(order);
+}
+#else
 layout(set = 0, binding = 8) uniform utexture2D ids;
+
+uint visible_triangle(ivec2 pixel) {
+    return texelFetch(ids, pixel, 0).r;
+}
+#endif
 layout(set = 0, binding = 12, rgba16f) writeonly uniform image2D hdr;
 
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     bool inside = all(lessThan(gl_GlobalInvocationID.xy, frame.size_px));
-    uint id = inside ? texelFetch(ids, pixel, 0).r : NO_TRIANGLE;
+    uint id = inside ? visible_triangle(pixel) : NO_TRIANGLE;
     bool covered = id != NO_TRIANGLE;
 
     Surface s;

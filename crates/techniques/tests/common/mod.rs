@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use afterlight_image::{Rgba8Image, psnr_db};
 use afterlight_techniques::{
-    Params, Prepared, Renderer, SceneGpu, Settings, Technique,
+    Params, Prepared, Renderer, SceneGpu, Settings, Technique, TechniqueError,
     graph::gpu,
     scene::{self, Camera, Light, Scene, lights::seeded_lights},
 };
@@ -52,10 +52,18 @@ impl Stage {
 
     /// A technique made ready with parameters.
     pub fn prepare_with(&self, technique: &dyn Technique, settings: &Settings, params: &Params) -> Prepared {
-        let renderer = Renderer::with_scene(&self.device, self.uploaded.clone(), settings)
-            .unwrap_or_else(|e| panic!("{e}"));
-        let prepared = renderer.prepare(technique, params);
+        let prepared = self.try_prepare(technique, settings, params);
         prepared.unwrap_or_else(|e| panic!("{}: {e}", technique.info().id))
+    }
+
+    /// The same, or why not.
+    pub fn try_prepare(
+        &self,
+        technique: &dyn Technique,
+        settings: &Settings,
+        params: &Params,
+    ) -> Result<Prepared, TechniqueError> {
+        Renderer::with_scene(&self.device, self.uploaded.clone(), settings)?.prepare(technique, params)
     }
 
     /// A technique's image.
