@@ -90,6 +90,27 @@ bool triangle_at(uint id, vec2 ndc, out float depth) {
     return all(greaterThanEqual(b, vec3(0.0))) && w > 0.0;
 }
 
+// Changes of the texture coordinates as a quad of fragments has them: differences between its upper left pixel and those
+// beside it and below. In place of the analytic ones where a decision must fall as it does in a fragment shader.
+void take_quad_gradients(uint id, uvec2 pixel, inout SurfacePoint p) {
+    DrawData d = load_draw(draw_data, id >> TRIANGLE_BITS);
+    uvec3 v = triangle_vertices(id, d);
+    vec3 c0 = clip_xyw(load_position(d, v.x)), c1 = clip_xyw(load_position(d, v.y)), c2 = clip_xyw(load_position(d, v.z));
+    uvec2 corner = pixel & ~1u;
+    vec3 at = barycentrics_at(ndc_from_pixel(corner), c0, c1, c2).at;
+    vec3 dx = barycentrics_at(ndc_from_pixel(corner + uvec2(1u, 0u)), c0, c1, c2).at - at;
+    vec3 dy = barycentrics_at(ndc_from_pixel(corner + uvec2(0u, 1u)), c0, c1, c2).at - at;
+    uvec3 a = v * 7u;
+    mat3x2 uv0 = mat3x2(load_uv(a.x, 2u), load_uv(a.y, 2u), load_uv(a.z, 2u));
+    p.uv0.ddx = uv0 * dx;
+    p.uv0.ddy = uv0 * dy;
+    if (HAS_UV1 != 0u) {
+        mat3x2 uv1 = mat3x2(load_uv(a.x, 4u), load_uv(a.y, 4u), load_uv(a.z, 4u));
+        p.uv1.ddx = uv1 * dx;
+        p.uv1.ddy = uv1 * dy;
+    }
+}
+
 SurfacePoint triangle_point(uint id, vec2 ndc, out uint material) {
     DrawData d = load_draw(draw_data, id >> TRIANGLE_BITS);
     material = d.material;

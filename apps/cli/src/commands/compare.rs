@@ -8,7 +8,7 @@ use afterlight_report::{Picture, Report, Section, bytes_text, ms_text, psnr_text
 use afterlight_techniques::{Exactness, Info, Params, view};
 use comfy_table::Table;
 
-use crate::args::{CommonArgs, CompareArgs};
+use crate::args::{CommonArgs, CompareArgs, Post};
 use crate::failure::Failure;
 use crate::frames::{self, Measured};
 use crate::pictures;
@@ -16,7 +16,7 @@ use crate::progress::Progress;
 use crate::session::{self, Chosen, Session};
 use crate::{output, text};
 
-/// Least PSNR to the reference of an exact technique at more than one sample, dB (contract).
+/// Least PSNR to the reference of an exact technique at more than one sample, dB (contract); with a filter at one as well.
 const MULTISAMPLE_PSNR_DB: f64 = 40.0;
 
 pub fn run(args: &CompareArgs) -> Result<(), Failure> {
@@ -132,8 +132,7 @@ pub fn compare(
                 &mut one.result,
                 chosen.technique.info(),
                 difference.psnr_or_infinity_db(),
-                common.samples,
-                common.view == view::FINAL,
+                common,
                 &reference,
             );
             one.result.difference = Some(difference);
@@ -165,20 +164,15 @@ fn most_fragments(result: &RunResult) -> Option<u64> {
 }
 
 /// Marks a technique as failed whose image is further from the reference than it may be.
-fn judge(
-    result: &mut RunResult,
-    info: &Info,
-    psnr_db: f64,
-    samples: u32,
-    is_final: bool,
-    reference: &Chosen,
-) {
+fn judge(result: &mut RunResult, info: &Info, psnr_db: f64, common: &CommonArgs, reference: &Chosen) {
     // Bounds are stated against forward's image.
-    if reference.id() != "forward" || !is_final {
+    if reference.id() != "forward" || common.view != view::FINAL {
         return;
     }
+    // A filter decides by the image: a difference of rounding may become another decision.
+    let is_plain = common.samples == 1 && common.post == Post::None;
     let least_db = match info.exactness {
-        Exactness::Exact { min_psnr_db } if samples == 1 => min_psnr_db,
+        Exactness::Exact { min_psnr_db } if is_plain => min_psnr_db,
         Exactness::Exact { .. } => MULTISAMPLE_PSNR_DB,
         Exactness::Approximate { min_psnr_db, .. } => min_psnr_db,
     };
@@ -219,11 +213,8 @@ pub fn verdict(run: &Run) -> Result<(), Failure> {
     let dropped = |result: &&RunResult| {
         result.counters.iter().any(|(name, count)| name.ends_with("_dropped") && count.as_u64() > Some(0))
     };
-    let failed: Vec<&RunResult> = run
-        .results
-        .iter()
-        .filter(|result| result.status == Status::Failed || dropped(result))
-        .collect();
+    let failed: Vec<&RunResult> =
+        run.results.iter().filter(|result| result.status == Status::Failed || dropped(result)).collect();
     let Some(first) = failed.first() else { return Ok(()) };
     let names: Vec<&str> = failed.iter().map(|result| result.technique.as_str()).collect();
     let reason = first.reason.as_deref().unwrap_or("no reason given");

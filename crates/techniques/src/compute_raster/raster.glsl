@@ -155,7 +155,9 @@ void vertices_clip(DrawData d, uvec3 v, out vec4 c0, out vec4 c1, out vec4 c2) {
 bool passes_alpha(uint draw, uint triangle, ivec2 pixel) {
 #ifdef ALPHA_MASK
     uint material;
-    SurfacePoint p = triangle_point(draw << TRIANGLE_BITS | triangle, ndc_from_pixel(uvec2(pixel)), material);
+    uint id = draw << TRIANGLE_BITS | triangle;
+    SurfacePoint p = triangle_point(id, ndc_from_pixel(uvec2(pixel)), material);
+    take_quad_gradients(id, uvec2(pixel), p);
     MaterialData m = load_material(material);
     return base_color_at(m, p).a >= m.alpha_cutoff;
 #else

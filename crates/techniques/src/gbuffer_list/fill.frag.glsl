@@ -26,11 +26,13 @@ void main() {
         return;
     }
     ivec2 pixel = ivec2(gl_FragCoord.xy);
-    bool single = FILTERS != 0u && (single_sample_pixel(pixel) || single_sample_surface(draw_material.x, distance_m));
+    bool single_pixel = FILTERS != 0u && single_sample_pixel(pixel);
+    bool single = single_pixel || FILTERS != 0u && single_sample_surface(draw_material.x, distance_m);
     Coverage own = Coverage(uint(bitCount(mask)), uint(findLSB(mask)));
     uint head = pixel_block(pixel);
     if (own.index == 0u) {
-        own.count = single ? SAMPLES : own.count;
+        // Where other surfaces of the pixel may be stored, a filtered one weighs what it covers.
+        own.count = single_pixel ? SAMPLES : own.count;
         store_block(head, s, distance_m, own);
     } else if (!single) {
         uint place = atomicAdd(blocks_needed, 1u);

@@ -49,7 +49,7 @@ const POSITION: ParamInfo = ParamInfo {
 static INFO: Info = Info {
     id: "gbuffer-list",
     title: "G-buffer of per-pixel lists",
-    summary: "Each visible surface of a pixel stands once, in a block of 112 bits; blocks beyond the first are linked on demand.",
+    summary: "Each visible surface of a pixel stands once, in a block of 144 bits, or the paper's 112; blocks beyond the first are linked on demand.",
     sources: &[Source { key: "fridvalszky-2020", section: "3 to 5" }],
     answers: Answers {
         surface: "G-buffer, per-pixel lists",

@@ -87,7 +87,7 @@ bool source_next(out Surface s, out uint weight) {
     } else {
         float depth = SAMPLE_DEPTH(source_pixel, sample_index);
         vec2 ndc = ndc_from_sample(source_pixel, sample_index);
-        if (KEEPS_ALL != 0u && weight == SAMPLES && SAMPLES <= 8u) {
+        if (KEEPS_ALL != 0u && weight == SAMPLES && SAMPLES > 1u && SAMPLES <= 8u) {
             // Depth is affine on the screen, and this sample stands opposite to sample 0: between them is the centre.
             int opposite = SAMPLES == 4u ? 3 : 1;
             depth = 0.5 * (SAMPLE_DEPTH(source_pixel, 0u) + SAMPLE_DEPTH(source_pixel, uint(opposite)));
