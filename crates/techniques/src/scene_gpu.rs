@@ -144,6 +144,11 @@ impl SceneGpu {
         }))
     }
 
+    /// Whether there are alpha-masked surfaces: buckets of the upper half.
+    pub(crate) fn has_masked(&self) -> bool {
+        self.bucket_first[BUCKETS] > self.bucket_first[BUCKETS / 2]
+    }
+
     /// Number of draws: pieces of at most 1,024 triangles.
     pub fn draw_count(&self) -> usize {
         self.draw_infos.len()

@@ -133,8 +133,8 @@ pub fn rasterize(
     pass.dispatch([LIST_GROUPS, 1, 1]);
     pass.finish();
 
-    let has_masked = frame.scene.bucket_first[BUCKETS] > frame.scene.bucket_first[BUCKETS / 2];
-    let shader = if has_masked { "compute_raster/large.comp#mask" } else { "compute_raster/large.comp" };
+    let shader =
+        if frame.scene.has_masked() { "compute_raster/large.comp#mask" } else { "compute_raster/large.comp" };
     let mut pass = frame.compute(graph, &name("large triangles"), &frame.shader(shader)?);
     pass.constant("SAMPLES", samples).constant("JOB_CAPACITY", job_capacity);
     pass.read("DrawCommands", &frame.buffers.commands).read("TileJobs", &jobs).read("JobCount", &job_count);

@@ -2,7 +2,7 @@
 // post-depth coverage which samples it shows; the one with sample 0 writes the pixel's own block, others take one from the
 // counter and link it.
 //
-// In: gbuffer_depth (for filters). Out: Blocks, BlockCount.
+// In: gbuffer_depth (for filters). Out: Blocks, BlockCount; with ALPHA_MASK SampleClaims.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_post_depth_coverage : require
@@ -10,6 +10,21 @@
 #include "surface_in.glsl"
 #include "gbuffer_list/build_list.glsl"
 #include "gbuffer_list/filter.glsl"
+
+#ifdef ALPHA_MASK
+// Samples that a masked surface of the pixel has taken, 8 bits a pixel, 16 at 16 samples. Early tests come before the alpha
+// test: were the stencil bit to be set by them, a fragment without alpha would take it from one of the same depth that shows.
+layout(set = 0, binding = 14, scalar) buffer SampleClaims {
+    uint sample_claims[];
+};
+
+// Takes samples for this fragment; of those asked for, the ones that no other has.
+uint claim(uint pixel, uint samples) {
+    uint bits = SAMPLES > 8u ? 16u : 8u, a_word = 32u / bits;
+    uint shift = pixel % a_word * bits;
+    return samples & ~(atomicOr(sample_claims[pixel / a_word], samples << shift) >> shift);
+}
+#endif
 
 layout(early_fragment_tests) in;
 layout(post_depth_coverage) in;
@@ -21,15 +36,18 @@ void main() {
     Surface s = surface_at(m, p, base.rgb);
     float distance_m = max(dot(frame.distance_from_world, vec4(p.position_ws, 1.0)), 0.0);
 
+    ivec2 pixel = ivec2(gl_FragCoord.xy);
+    uint head = pixel_block(pixel);
     uint mask = uint(gl_SampleMaskIn[0]);
+#ifdef ALPHA_MASK
+    mask = claim(head, mask);
+#endif
     if (mask == 0u) {
         return;
     }
-    ivec2 pixel = ivec2(gl_FragCoord.xy);
     bool single_pixel = FILTERS != 0u && single_sample_pixel(pixel);
     bool single = single_pixel || FILTERS != 0u && single_sample_surface(draw_material.x, distance_m);
     Coverage own = Coverage(uint(bitCount(mask)), uint(findLSB(mask)));
-    uint head = pixel_block(pixel);
     if (own.index == 0u) {
         // Where other surfaces of the pixel may be stored, a filtered one weighs what it covers.
         own.count = single_pixel ? SAMPLES : own.count;

@@ -4,7 +4,9 @@
 
 mod filter;
 
-use afterlight_graph::{BufferHandle, DepthTest, Graph, ImageHandle, Load, gpu::vk};
+use afterlight_graph::{
+    BufferHandle, DepthTest, Graph, ImageHandle, Load, StencilFace, StencilTest, gpu::vk,
+};
 
 use crate::{
     ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, ParamInfo, ParamKind, Params, Source, Technique,
@@ -184,6 +186,12 @@ impl Layout {
     }
 }
 
+/// Passes where no fragment before has set the stencil bit, and leaves it.
+const NOT_TAKEN: StencilTest = {
+    let face = StencilFace { compare: vk::CompareOp::NOT_EQUAL, ..StencilFace::KEEP };
+    StencilTest { front: face, back: face, compare_mask: 0xff, write_mask: 0 }
+};
+
 /// The lists of a frame: blocks, and the counter of dynamic ones.
 struct Lists {
     blocks: BufferHandle,
@@ -337,8 +345,16 @@ fn fill_by_raster(graph: &mut Graph, frame: &Frame<'_>, layout: &Layout) -> Resu
         .depth(DepthTest::EQUAL)
         // Section 4.3: one bit of stencil against double writes of intersecting triangles.
         .stencil(FIRST_FRAGMENT, 1);
+    // Masked surfaces keep off what opaque ones have, and share the rest by claims.
+    fill.masked_stencil = Some(NOT_TAKEN);
     fill.constants = build_constants(frame, layout);
     let (blocks, count, flagged) = empty_lists(graph, frame, layout)?;
+    let claims = frame.scene.has_masked().then(|| {
+        let bits = if layout.samples > 8 { 16 } else { 8 };
+        let pixels = u64::from(frame.width_px) * u64::from(frame.height_px);
+        let claims = graph.buffer("gbuffer-list/claims", 4 * (pixels * bits).div_ceil(32));
+        graph.clear_buffer("gbuffer-list/clear claims", claims, 0)
+    });
 
     let mut pass = graph.raster("gbuffer-list/depth");
     frame.bind_scene(&mut pass);
@@ -352,6 +368,7 @@ fn fill_by_raster(graph: &mut Graph, frame: &Frame<'_>, layout: &Layout) -> Resu
     pass.read("gbuffer_depth", &depth).read("SingleSampleDraws", &flagged);
     let blocks = pass.write("Blocks", blocks);
     let count = pass.write("BlockCount", count);
+    let _claims = claims.map(|claims| pass.write("SampleClaims", claims));
     let depth = pass.stencil(depth, Load::Keep);
     fill.draw(frame, &mut pass);
     pass.finish();

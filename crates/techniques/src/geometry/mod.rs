@@ -35,6 +35,8 @@ pub struct Surfaces {
     pub depth: DepthTest,
     /// Stencil test.
     pub stencil: Option<StencilTest>,
+    /// Stencil test of masked surfaces where it is another; `None` is the same.
+    pub masked_stencil: Option<StencilTest>,
     /// Stencil reference.
     pub stencil_reference: u32,
     /// Blending of each colour attachment; empty replaces.
@@ -88,6 +90,7 @@ impl Surfaces {
             },
             depth: DepthTest::NEAREST,
             stencil: None,
+            masked_stencil: None,
             stencil_reference: 0,
             blend: Vec::new(),
             constants: Vec::new(),
@@ -147,7 +150,7 @@ impl Surfaces {
         state.constants = frame.constants(&all);
         state.constants.extend(self.constants.iter().cloned());
         state.depth = self.depth;
-        state.stencil = self.stencil;
+        state.stencil = if bucket.masked() { self.masked_stencil.or(self.stencil) } else { self.stencil };
         state.blend = self.blend.clone();
         state.layout = vertex_layout();
         state.cull = if bucket.double_sided() { vk::CullModeFlags::NONE } else { vk::CullModeFlags::BACK };

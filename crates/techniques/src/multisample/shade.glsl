@@ -36,7 +36,8 @@ vec3 resolved(vec3 weighted_radiance) {
         return vec3(shaded_count > 1u ? 1.0 : 0.0);
     }
     if (VIEW == 4u) {
-        return vec3(weight_sum + source_background == SAMPLES ? 0.0 : 1.0, 0.0, 0.0);
+        uint sum = weight_sum + source_background;
+        return vec3(sum > SAMPLES ? 1.0 : 0.0, 0.0, sum < SAMPLES ? 1.0 : 0.0);
     }
     if (weight_sum == 0u) {
         return frame.background_radiance;

@@ -15,7 +15,7 @@ pub const INVOCATIONS: &str = "invocations";
 pub const SAMPLE_USAGE: &str = "sample-usage";
 /// Pixels that are shaded at more than pixel rate.
 pub const EDGES: &str = "edges";
-/// Pixels whose weights do not sum to the number of samples: red; others are black.
+/// Pixels whose weights sum to more than the number of samples: red; to less: blue; others are black.
 pub const WEIGHTS: &str = "weights";
 
 /// Number of a view in `multisample/shade.glsl`.
