@@ -47,7 +47,10 @@ enum What {
     /// From what lists are filled in compute: triangle IDs of samples, or keys of depth and triangle with the queues of
     /// their rasterisation. The paper's fill has none.
     Visibility,
-    /// G-buffer, depth buffer and visibility.
+    /// Samples that masked surfaces have taken, a byte a pixel where lists are filled by raster in a scene that has any. The
+    /// paper tells of no alpha test.
+    Claims,
+    /// G-buffer, depth buffer and visibility: what the paper's total holds.
     Total,
     /// The radiance that lighting writes, which the paper leaves out of its table.
     Output,
@@ -67,7 +70,7 @@ impl Paper {
             What::GBuffer => self.gbuffer_mib,
             What::ZBuffer => self.zbuffer_mib,
             What::Total => Some(self.total_mib),
-            What::Visibility | What::Output => None,
+            What::Visibility | What::Claims | What::Output => None,
         }
     }
 }
@@ -458,6 +461,7 @@ fn part(name: &str, sizes: &Sizes) -> Option<(What, u64)> {
         (_, "large count" | "job count") => (What::Visibility, 8),
         (_, "blocks") => (What::GBuffer, (sizes.pixels + sizes.blocks).div_ceil(2) * sizes.pair_bytes),
         (_, "block count") => (What::GBuffer, 8),
+        (_, "claims") => (What::Claims, sizes.pixels.div_ceil(4) * 4),
         (_, "accumulation" | "radiance") => (What::Output, sizes.pixels * 8),
         _ => return None,
     })
@@ -492,7 +496,7 @@ fn resources(column: &Column, result: &RunResult, pixels: u64) -> Vec<Resource> 
 
 fn cells(column: &Column, result: &RunResult, pixels: u64) -> Vec<Cell> {
     let resources = resources(column, result, pixels);
-    [What::GBuffer, What::ZBuffer, What::Visibility, What::Total, What::Output]
+    [What::GBuffer, What::ZBuffer, What::Visibility, What::Total, What::Claims, What::Output]
         .into_iter()
         .map(|what| cell(column, result, what, &resources, pixels))
         .collect()
@@ -506,7 +510,9 @@ fn deviation_percent(bytes: f64, mib: f64) -> f64 {
 fn cell(column: &Column, result: &RunResult, what: What, resources: &[Resource], pixels: u64) -> Cell {
     let resources: Vec<Resource> = resources
         .iter()
-        .filter(|one| one.what == what || what == What::Total && one.what != What::Output)
+        .filter(|one| {
+            one.what == what || what == What::Total && !matches!(one.what, What::Output | What::Claims)
+        })
         .cloned()
         .collect();
     let has_figures = result.memory.is_some();
@@ -582,6 +588,7 @@ fn row_name(what: What) -> &'static str {
         What::GBuffer => "G-buffer",
         What::ZBuffer => "Z-buffer",
         What::Visibility => "visibility",
+        What::Claims => "claims",
         What::Total => "total",
         What::Output => "output",
     }
@@ -597,6 +604,8 @@ fn mib_text(mib: Option<f64>) -> String {
 
 fn notes(session: &Session, common: &CommonArgs) -> Vec<String> {
     let mut notes = vec![
+        "claims: a byte a pixel where a raster fill meets masked surfaces, beside the total: the paper has none"
+            .to_owned(),
         format!(
             "{} stands in for the paper's scenes; its surfaces do not emit here, since the paper's have no emission (it would take 4 bytes more of every sample)",
             session.scene.name
