@@ -51,7 +51,7 @@ void main() {
                 covered |= inside ? 1u << i : 0u;
             }
             if (covered != 0u) {
-                keep_nearest(pixel, covered, t, plane, order, d.draw);
+                keep_nearest(pixel, covered, t, plane, order, d);
             }
         }
     }

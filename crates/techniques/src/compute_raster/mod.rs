@@ -11,7 +11,7 @@ use crate::{
     error::TechniqueError,
     frame::Frame,
     params::{ParamInfo, ParamKind},
-    scene_gpu::{BUCKETS, Bucket, DRAW_TRIANGLES},
+    scene_gpu::{BUCKETS, DRAW_TRIANGLES},
 };
 
 /// Large triangles that the first frame has room for.
@@ -92,37 +92,32 @@ pub fn rasterize(
     let large_count = graph.buffer(&name("large count"), 8);
     let job_count = graph.buffer(&name("job count"), 8);
     let keys = graph.clear_buffer(&name("clear keys"), keys, 0);
-    let mut large_count = graph.clear_buffer(&name("clear large count"), large_count, 0);
+    let large_count = graph.clear_buffer(&name("clear large count"), large_count, 0);
     let job_count = graph.clear_buffer(&name("clear job count"), job_count, 0);
 
-    let (mut keys, mut large) = (keys, large);
-    for (stage, shader, masked) in [
-        ("triangles", "compute_raster/triangles.comp", false),
-        ("masked triangles", "compute_raster/triangles.comp#mask", true),
-    ] {
-        let buckets: Vec<usize> = (0..BUCKETS)
-            .filter(|b| Bucket(*b).masked() == masked)
-            .filter(|b| frame.scene.bucket_first[b + 1] > frame.scene.bucket_first[*b])
-            .collect();
-        // Opaque surfaces run always, so that the keys and counts are written.
-        if buckets.is_empty() && masked {
-            continue;
+    let has_masked = frame.scene.has_masked();
+    let variant = |shader: &str| if has_masked { format!("{shader}#mask") } else { shader.to_owned() };
+    // One pass for opaque and masked surfaces: a few slow threads of alpha tests then have company.
+    let shader = frame.shader(&variant("compute_raster/triangles.comp"))?;
+    let mut pass = frame.compute(graph, &name("triangles"), &shader);
+    pass.constant("SAMPLES", samples)
+        .constant("LARGE_CAPACITY", large_capacity)
+        .constant("SMALL_PX", small_px);
+    pass.read("DrawCommands", &frame.buffers.commands).read("DrawCounts", &frame.buffers.command_counts);
+    let keys = pass.write("SampleKeys", keys);
+    let large = pass.write("LargeTriangles", large);
+    let large_count = pass.write("LargeCount", large_count);
+    let most_groups = frame.features().max_workgroup_count[0];
+    for bucket in 0..BUCKETS {
+        let first = frame.scene.bucket_first[bucket];
+        let draws = frame.scene.bucket_first[bucket + 1] - first;
+        for first_draw in (0..draws).step_by(most_groups as usize) {
+            pass.push(&[bucket as u32, first, first_draw]);
+            let groups = (draws - first_draw).min(most_groups);
+            pass.dispatch([groups, DRAW_TRIANGLES / GROUP_TRIANGLES, 1]);
         }
-        let mut pass = frame.compute(graph, &name(stage), &frame.shader(shader)?);
-        pass.constant("SAMPLES", samples).constant("LARGE_CAPACITY", large_capacity);
-        pass.constant("SMALL_PX", small_px);
-        pass.read("DrawCommands", &frame.buffers.commands).read("DrawCounts", &frame.buffers.command_counts);
-        keys = pass.write("SampleKeys", keys);
-        large = pass.write("LargeTriangles", large);
-        large_count = pass.write("LargeCount", large_count);
-        for bucket in buckets {
-            let first = frame.scene.bucket_first[bucket];
-            let max = frame.scene.bucket_first[bucket + 1] - first;
-            pass.push(&[bucket as u32, first]);
-            pass.dispatch([max, DRAW_TRIANGLES / GROUP_TRIANGLES, 1]);
-        }
-        pass.finish();
     }
+    pass.finish();
 
     let mut pass = frame.compute(graph, &name("bin"), &frame.shader("compute_raster/bin.comp")?);
     pass.constant("LARGE_CAPACITY", large_capacity).constant("JOB_CAPACITY", job_capacity);
@@ -133,9 +128,8 @@ pub fn rasterize(
     pass.dispatch([LIST_GROUPS, 1, 1]);
     pass.finish();
 
-    let shader =
-        if frame.scene.has_masked() { "compute_raster/large.comp#mask" } else { "compute_raster/large.comp" };
-    let mut pass = frame.compute(graph, &name("large triangles"), &frame.shader(shader)?);
+    let shader = frame.shader(&variant("compute_raster/large.comp"))?;
+    let mut pass = frame.compute(graph, &name("large triangles"), &shader);
     pass.constant("SAMPLES", samples).constant("JOB_CAPACITY", job_capacity);
     pass.read("DrawCommands", &frame.buffers.commands).read("TileJobs", &jobs).read("JobCount", &job_count);
     let keys = pass.write("SampleKeys", keys);

@@ -35,12 +35,14 @@ struct RasterDraw {
     DrawData data;
     uint draw;
     bool double_sided;
+    float alpha_cutoff;     // 0: no alpha test
 };
 
 RasterDraw load_raster_draw(uint command) {
     uint draw = draw_commands[command * 5u + 4u];
     DrawData d = load_draw(draw_data, draw);
-    return RasterDraw(d, draw, (load_material(d.material).flags & MATERIAL_DOUBLE_SIDED) != 0u);
+    MaterialData m = load_material(d.material);
+    return RasterDraw(d, draw, (m.flags & MATERIAL_DOUBLE_SIDED) != 0u, m.alpha_cutoff);
 }
 
 ivec2 snapped(vec4 clip) {
@@ -152,21 +154,23 @@ void vertices_clip(DrawData d, uvec3 v, out vec4 c0, out vec4 c1, out vec4 c2) {
 }
 
 // Alpha test at the pixel's centre, as a fragment shader has it.
-bool passes_alpha(uint draw, uint triangle, ivec2 pixel) {
+bool passes_alpha(RasterDraw d, uint triangle, ivec2 pixel) {
 #ifdef ALPHA_MASK
+    if (d.alpha_cutoff <= 0.0) {
+        return true;
+    }
     uint material;
-    uint id = draw << TRIANGLE_BITS | triangle;
+    uint id = d.draw << TRIANGLE_BITS | triangle;
     SurfacePoint p = triangle_point(id, ndc_from_pixel(uvec2(pixel)), material);
     take_quad_gradients(id, uvec2(pixel), p);
-    MaterialData m = load_material(material);
-    return base_color_at(m, p).a >= m.alpha_cutoff;
+    return base_color_at(load_material(material), p).a >= d.alpha_cutoff;
 #else
     return true;
 #endif
 }
 
 // Keeps the nearest surface of the samples that a mask names. `order` is the triangle's place in the order of draws.
-void keep_nearest(ivec2 pixel, uint covered, ScreenTriangle t, DepthPlane plane, uint order, uint draw) {
+void keep_nearest(ivec2 pixel, uint covered, ScreenTriangle t, DepthPlane plane, uint order, RasterDraw d) {
     vec2 corner = vec2(pixel) - vec2(t.p0) / float(SUBPIXELS);
     uint wins = 0u;
     for (uint i = 0u; i < SAMPLES; ++i) {
@@ -177,7 +181,7 @@ void keep_nearest(ivec2 pixel, uint covered, ScreenTriangle t, DepthPlane plane,
             wins |= depth > 0.0 && key > sample_keys[key_index(pixel, i)] ? 1u << i : 0u;
         }
     }
-    if (wins == 0u || !passes_alpha(draw, order & ((1u << TRIANGLE_BITS) - 1u), pixel)) {
+    if (wins == 0u || !passes_alpha(d, order & ((1u << TRIANGLE_BITS) - 1u), pixel)) {
         return;
     }
     for (uint i = 0u; i < SAMPLES; ++i) {

@@ -1,7 +1,7 @@
 // Rasterises small triangles, a thread each, and lists the others. Eight groups share a draw of at most 1,024 triangles.
 //
 // In: the scene, draw commands. Out: SampleKeys; LargeTriangles: place in the order of draws. Dispatch: draws of a bucket
-// x 8. ALPHA_MASK tests the alpha of masked surfaces.
+// x 8. ALPHA_MASK tests alpha where a material has a cutoff.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "compute_raster/raster.glsl"
@@ -20,14 +20,15 @@ layout(set = 0, binding = 12, scalar) buffer LargeCount {
 layout(constant_id = 10) const uint LARGE_CAPACITY = 0u;
 layout(push_constant, scalar) uniform Push {
     uint bucket;
-    uint first_command;
+    uint first_command;     // of the bucket
+    uint first_draw;        // of those in view
 };
 
 // Side of the box of a small triangle, pixels: longer loops of one thread cost more than a group's turn at the triangle.
 // 32-bit edge functions hold up to 64 pixels.
 layout(constant_id = 11) const uint SMALL_PX = 16u;
 
-void rasterize_small(ScreenTriangle t, ivec2 first, ivec2 last, uint order, uint draw) {
+void rasterize_small(ScreenTriangle t, ivec2 first, ivec2 last, uint order, RasterDraw d) {
     DepthPlane plane = depth_plane(t);
     ivec2 d0 = t.p1 - t.p0, d1 = t.p2 - t.p1, d2 = t.p0 - t.p2;
     ivec3 bias = ivec3(edge_bias(t.p0, t.p1), edge_bias(t.p1, t.p2), edge_bias(t.p2, t.p0));
@@ -48,17 +49,18 @@ void rasterize_small(ScreenTriangle t, ivec2 first, ivec2 last, uint order, uint
                 covered |= all(greaterThanEqual(at, ivec3(0))) ? 1u << i : 0u;
             }
             if (covered != 0u) {
-                keep_nearest(ivec2(x, y), covered, t, plane, order, draw);
+                keep_nearest(ivec2(x, y), covered, t, plane, order, d);
             }
         }
     }
 }
 
 void main() {
-    if (gl_WorkGroupID.x >= draw_counts[bucket]) {
+    uint place = first_draw + gl_WorkGroupID.x;
+    if (place >= draw_counts[bucket]) {
         return;
     }
-    uint command = first_command + gl_WorkGroupID.x;
+    uint command = first_command + place;
     RasterDraw d = load_raster_draw(command);
     uint triangles = draw_commands[command * 5u] / 3u;
     uint triangle = gl_WorkGroupID.y * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
@@ -84,11 +86,11 @@ void main() {
     }
     uint order = command << TRIANGLE_BITS | triangle;
     if (!is_large) {
-        rasterize_small(t, first, last, order, d.draw);
+        rasterize_small(t, first, last, order, d);
     } else {
-        uint place = atomicAdd(large_needed, 1u);
-        if (place < LARGE_CAPACITY) {
-            large_triangles[place] = order;
+        uint slot = atomicAdd(large_needed, 1u);
+        if (slot < LARGE_CAPACITY) {
+            large_triangles[slot] = order;
         } else {
             atomicAdd(large_dropped, 1u);
         }
