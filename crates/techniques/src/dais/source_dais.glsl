@@ -1,10 +1,12 @@
 // Surfaces of a pixel from a visibility buffer and the triangle buffer: each triangle once, weighted by its samples (Schied
 // and Dachsbacher 2015, Listing 1).
 //
-// Departure: a sample holds a triangle's name alone, and which samples share it is found by comparing them, not from a coverage
-// mask stored with it.
-#include "triangle_buffer/index.glsl"
+// REFERENCES: samples hold 24 bits of reference and 8 bits of coverage, as in the paper. Else they hold a triangle's name alone,
+// and which samples share it is found by comparing them.
 #include "triangle_buffer/interpolate.glsl"
+#ifndef REFERENCES
+#include "triangle_buffer/index.glsl"
+#endif
 #ifdef SAMPLES_IN_KEYS
 uint sample_triangle(ivec2 pixel, uint i) {
     return ~sample_keys[sample_word(pixel, i)];
@@ -39,13 +41,18 @@ bool source_next(out Surface s, out uint weight) {
     while (weight == 0u && source_mask != 0u) {
         uint first = uint(findLSB(source_mask));
         id = sample_triangle(source_pixel, first);
+#ifdef REFERENCES
+        // Of what the triangle covers, what no triangle before has had.
+        uint same = id == NO_TRIANGLE ? 1u << first : (id >> 24 | 1u << first) & source_mask;
+#else
         uint same = 1u << first;
         for (uint i = first + 1u; i < SAMPLES; ++i) {
             same |= (source_mask >> i & 1u) != 0u && sample_triangle(source_pixel, i) == id ? 1u << i : 0u;
         }
+#endif
         source_mask &= ~same;
         if (id == NO_TRIANGLE) {
-            source_background = uint(bitCount(same));
+            source_background += uint(bitCount(same));
         } else {
             weight = uint(bitCount(same));
         }
@@ -54,7 +61,12 @@ bool source_next(out Surface s, out uint weight) {
         return false;
     }
     uint material;
-    SurfacePoint p = interpolated_point(triangle_index(id), source_pixel, material);
+#ifdef REFERENCES
+    uint place = id & 0xffffffu;
+#else
+    uint place = triangle_index(id);
+#endif
+    SurfacePoint p = interpolated_point(place, source_pixel, material);
     MaterialData m = load_material(material);
     s = surface_at(m, p, base_color_at(m, p).rgb);
     return true;

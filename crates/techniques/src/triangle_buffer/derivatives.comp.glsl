@@ -1,22 +1,30 @@
 // Writes the record of each visible triangle (Schied and Dachsbacher 2015, section 4.2 and appendix A). A thread a triangle
-// of the scene; those that do not show end at once.
+// of the scene; those that do not show end at once. With LISTED a thread a stored triangle, whose ID stands in its record.
 //
 // Departure: the paper clips triangles by shrinking them, since its barycentric coordinates (equations 3 and 4) need projected
 // vertices. With homogeneous ones (Olano and Greer 1997) the edge functions b_i of the clip positions are affine on the screen as
 // well, whatever lies behind the eye, and with det = sum b_i w_i it is 1/w = sum b_i / det and a/w = sum b_i a_i / det: equation 5
 // without a clip.
 //
-// In: the index, the scene. Out: TriangleBuffer. Dispatch: draws x 8.
+// In: the index, the scene. Out: TriangleBuffer. Dispatch: draws x 8; LISTED: as many as size.comp.glsl says.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "triangle.glsl"
 #include "triangle_buffer/record.glsl"
+#ifndef LISTED
 #include "triangle_buffer/index.glsl"
+#endif
 
 layout(local_size_x = 128) in;
-layout(set = 0, binding = 8, scalar) writeonly buffer TriangleBuffer {
+layout(set = 0, binding = 8, scalar) buffer TriangleBuffer {
     uint triangle_buffer[];
 };
+#ifdef LISTED
+layout(set = 0, binding = 10, scalar) readonly buffer TriangleCount {
+    uint triangles_needed;
+    uint triangles_dropped;
+};
+#endif
 #ifdef SAMPLES_IN_KEYS
 // VkDrawIndexedIndirectCommand: index count, 1, first index, vertex offset, draw.
 layout(set = 0, binding = 9, scalar) readonly buffer DrawCommands {
@@ -24,9 +32,11 @@ layout(set = 0, binding = 9, scalar) readonly buffer DrawCommands {
 };
 #endif
 layout(constant_id = 11) const uint TRIANGLE_CAPACITY = 0u;
+#ifndef LISTED
 layout(push_constant, scalar) uniform Push {
     uint first_draw;
 };
+#endif
 
 // Affine functions on the screen: value at the anchor, changes a pixel.
 struct Affine {
@@ -63,6 +73,14 @@ vec2 anchor_px(vec3 c0, vec3 c1, vec3 c2) {
 }
 
 void main() {
+#ifdef LISTED
+    uint index = gl_GlobalInvocationID.x;
+    if (index >= min(triangles_needed, TRIANGLE_CAPACITY)) {
+        return;
+    }
+    uint id = triangle_buffer[index * RECORD_WORDS];
+    uint draw_slot = id >> TRIANGLE_BITS, triangle = id & ((1u << TRIANGLE_BITS) - 1u);
+#else
     uint draw_slot = first_draw + gl_WorkGroupID.x;
     uint triangle = gl_WorkGroupID.y * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
     uint id = draw_slot << TRIANGLE_BITS | triangle;
@@ -73,6 +91,7 @@ void main() {
     if (index >= TRIANGLE_CAPACITY) {
         return;
     }
+#endif
 #ifdef SAMPLES_IN_KEYS
     uint draw = draw_commands[draw_slot * 5u + 4u];
 #else

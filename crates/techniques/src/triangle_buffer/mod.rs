@@ -6,7 +6,7 @@
 //! turn bits into places, and a thread a marked triangle writes its record. No lock, no cache, each triangle once, in the order
 //! of draws.
 
-use afterlight_graph::{BufferHandle, Graph, ImageHandle};
+use afterlight_graph::{BufferHandle, Graph, ImageHandle, RasterPass};
 
 use crate::{
     error::TechniqueError,
@@ -96,6 +96,87 @@ fn record_bytes(frame: &Frame<'_>) -> u64 {
     80 + 24 * u64::from(has("HAS_UV1")) + 48 * u64::from(has("HAS_VERTEX_COLOR"))
 }
 
+/// A triangle buffer that fragments append to: a list of triangle IDs, one in the first word of each record.
+pub struct List {
+    records: BufferHandle,
+    count: BufferHandle,
+    /// Triangles that there is room for.
+    pub capacity: u32,
+}
+
+impl List {
+    /// Declares an empty list of at most `most` triangles.
+    ///
+    /// # Errors
+    /// More triangles than `most` or than one binding holds.
+    pub fn new(
+        graph: &mut Graph,
+        frame: &Frame<'_>,
+        technique: &str,
+        most: u32,
+    ) -> Result<Self, TechniqueError> {
+        let (capacity, bytes) = room(frame, technique)?;
+        if capacity > most {
+            let what = format!("{technique}: triangles that a visibility sample's reference tells apart");
+            return Err(TechniqueError::TooLarge { what, found: capacity.into(), limit: most.into() });
+        }
+        let records = graph.buffer(&format!("{technique}/triangle buffer"), bytes);
+        let count = graph.buffer(&format!("{technique}/triangle count"), 8);
+        let count = graph.clear_buffer(&format!("{technique}/clear count"), count, 0);
+        Ok(Self { records, count, capacity })
+    }
+
+    /// Binds it to the pass that appends.
+    pub fn written_by(self, pass: &mut RasterPass<'_>) -> Self {
+        let records = pass.write("TriangleBuffer", self.records);
+        let count = pass.write("TriangleCount", self.count);
+        Self { records, count, ..self }
+    }
+
+    /// Declares the pass that overwrites each listed ID by its triangle's record, sized on the device, and returns the
+    /// records.
+    ///
+    /// # Errors
+    /// A shader that is not compiled in.
+    pub fn derivatives(
+        self,
+        graph: &mut Graph,
+        frame: &Frame<'_>,
+        technique: &str,
+    ) -> Result<BufferHandle, TechniqueError> {
+        let groups = graph.buffer(&format!("{technique}/dispatch groups"), 12);
+        let shader = frame.shader("triangle_buffer/size.comp")?;
+        let mut pass = frame.compute(graph, &format!("{technique}/size"), &shader);
+        pass.constant("TRIANGLE_CAPACITY", self.capacity);
+        pass.read("TriangleCount", &self.count);
+        let groups = pass.write("DispatchGroups", groups);
+        pass.dispatch([1, 1, 1]);
+        pass.finish();
+
+        let shader = frame.shader("triangle_buffer/derivatives.comp#list")?;
+        let mut pass = frame.compute(graph, &format!("{technique}/derivatives"), &shader);
+        pass.constant("TRIANGLE_CAPACITY", self.capacity);
+        pass.read("TriangleCount", &self.count);
+        let records = pass.write("TriangleBuffer", self.records);
+        pass.dispatch_indirect(&groups, 0);
+        pass.finish();
+        frame.watch(graph, "triangles", &self.count, self.capacity, false);
+        Ok(records)
+    }
+}
+
+/// Triangles that there should be room for, and their bytes.
+fn room(frame: &Frame<'_>, technique: &str) -> Result<(u32, u64), TechniqueError> {
+    let capacity = frame.capacity("triangles", FIRST_GUESS);
+    let bytes = record_bytes(frame) * u64::from(capacity);
+    let limit = frame.features().max_storage_buffer_range;
+    if bytes > limit {
+        let what = format!("{technique}: bytes of the triangle buffer for {capacity} triangles");
+        return Err(TechniqueError::TooLarge { what, found: bytes, limit });
+    }
+    Ok((capacity, bytes.max(4)))
+}
+
 /// Declares the passes that store every triangle which shows in `visible`.
 ///
 /// # Errors
@@ -108,20 +189,14 @@ pub fn fill(
 ) -> Result<TriangleBuffer, TechniqueError> {
     let name = |stage: &str| format!("{technique}/{stage}");
     let draws = (frame.scene.draw_count() as u32).max(1);
-    let capacity = frame.capacity("triangles", FIRST_GUESS);
-    let bytes = record_bytes(frame) * u64::from(capacity);
-    let limit = frame.features().max_storage_buffer_range;
-    if bytes > limit {
-        let what = format!("{technique}: bytes of the triangle buffer for {capacity} triangles");
-        return Err(TechniqueError::TooLarge { what, found: bytes, limit });
-    }
+    let (capacity, bytes) = room(frame, technique)?;
     let words = u64::from(draws) * WORDS_A_DRAW;
     let bits = graph.buffer(&name("visible bits"), 4 * words);
     let before = graph.buffer(&name("visible before"), 4 * words);
     let of_draw = graph.buffer(&name("visible of draw"), 4 * u64::from(draws));
     let base = graph.buffer(&name("draw base"), 4 * u64::from(draws));
     let count = graph.buffer(&name("triangle count"), 8);
-    let records = graph.buffer(&name("triangle buffer"), bytes.max(4));
+    let records = graph.buffer(&name("triangle buffer"), bytes);
     let bits = graph.clear_buffer(&name("clear bits"), bits, 0);
 
     let shader = frame.shader(&format!("triangle_buffer/mark.comp{}", visible.tag('#')))?;
