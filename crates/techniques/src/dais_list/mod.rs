@@ -30,8 +30,8 @@ const NODES: ParamInfo = ParamInfo {
 
 /// Most triangles that a node's 28 bits tell apart.
 const REFERENCES_MAX: u32 = 1 << 28;
-/// Nodes a pixel that the first frame of a view has room for, as a divisor.
-const FIRST_GUESS_PIXELS: u64 = 2;
+/// Pixels for each node that the first frame of a view has room for: it is run to count what the view needs.
+const FIRST_GUESS_PIXELS: u64 = 64;
 
 static INFO: Info = Info {
     id: "dais-list",

@@ -14,8 +14,8 @@ use crate::{
     scene_gpu::DRAW_TRIANGLES,
 };
 
-/// Triangles that the first frame of a view has room for.
-const FIRST_GUESS: u32 = 1 << 16;
+/// Triangles that the first frame of a view has room for: few, since that frame is run to count what the view needs.
+const FIRST_GUESS: u32 = 1 << 12;
 /// Words of 32 bits for a draw's triangles.
 const WORDS_A_DRAW: u64 = DRAW_TRIANGLES as u64 / 32;
 /// Triangles of a group: `local_size_x` in `derivatives.comp.glsl`.
