@@ -9,6 +9,7 @@
 use afterlight_graph::{BufferHandle, Graph, ImageHandle, RasterPass};
 
 use crate::{
+    capacity,
     error::TechniqueError,
     frame::{Frame, Slots},
     scene_gpu::DRAW_TRIANGLES,
@@ -160,7 +161,7 @@ impl List {
         let records = pass.write("TriangleBuffer", self.records);
         pass.dispatch_indirect(&groups, 0);
         pass.finish();
-        frame.watch(graph, "triangles", &self.count, self.capacity, false);
+        frame.watch_with(graph, "triangles", &self.count, self.capacity, false, capacity::UNSTEADY);
         Ok(records)
     }
 }
