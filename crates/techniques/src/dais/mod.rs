@@ -79,7 +79,11 @@ static INFO: Info = Info {
     id: "dais",
     title: "Deferred attribute interpolation shading",
     summary: "Samples hold triangle IDs; triangles that show are stored once, by screen-space derivatives, and shaded once a pixel.",
-    sources: &[Source { key: "schied-2015", section: "3, 4" }],
+    sources: &[
+        Source { key: "schied-2015", section: "3, 4" },
+        Source { key: "liktor-2012", section: "4" },
+        Source { key: "schueler-2007", section: "all" },
+    ],
     answers: Answers {
         surface: "triangle IDs and a triangle buffer",
         lights: "loop over all, or tiles",
