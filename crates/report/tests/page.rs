@@ -34,6 +34,7 @@ fn run() -> Run {
             camera: "front".into(),
             reference: "forward".into(),
             post: "smaa".into(),
+            tessellate_px: None,
             light_seed: Some(1),
             version: "0.1.0".into(),
         },

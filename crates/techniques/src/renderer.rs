@@ -15,6 +15,7 @@ use crate::{
     draw_list::{DrawList, DrawOptions, DrawOrder},
     error::TechniqueError,
     frame::{Frame, FrameBuffers},
+    geometry::MIN_TESSELLATE_PX,
     light_list::LightList,
     params::Params,
     post::{self, Post},
@@ -47,6 +48,8 @@ pub struct Settings {
     pub keep_hdr: bool,
     /// Anti-aliasing after shading.
     pub post: Post,
+    /// Tessellates surfaces to edges of that length on screen, pixels.
+    pub tessellate_px: Option<f32>,
 }
 
 impl Settings {
@@ -63,6 +66,7 @@ impl Settings {
             view: view::FINAL.to_owned(),
             keep_hdr: false,
             post: Post::None,
+            tessellate_px: None,
         }
     }
 }
@@ -159,6 +163,7 @@ impl Renderer {
     ) -> Result<Prepared, TechniqueError> {
         let info = technique.info();
         self.check(technique)?;
+        let displacement_m = self.check_tessellation(technique, params)?;
         let options = DrawOptions {
             cull: params.text(info, "cull") == "frustum",
             order: match params.text(info, "order") {
@@ -170,7 +175,7 @@ impl Renderer {
         let settings = &self.settings;
         let view = View::new(settings);
         let mut draws = DrawList::new(&self.device, &self.scene, options)?;
-        draws.update(&self.scene, view.clip_from_world, view.eye_ws)?;
+        draws.update(&self.scene, view.clip_from_world, view.eye_ws, displacement_m)?;
         let constants = self.device.create_buffer(&gpu::BufferDesc {
             name: "frame constants",
             bytes: size_of::<FrameConstants>() as u64,
@@ -227,6 +232,44 @@ impl Renderer {
         Ok(())
     }
 
+    /// Checks what is asked of tessellation; returns how far surfaces are displaced along each axis at most, m.
+    fn check_tessellation(
+        &self,
+        technique: &dyn Technique,
+        params: &Params,
+    ) -> Result<f32, TechniqueError> {
+        let info = technique.info();
+        let displacement_mm = params.number(info, "displacement-mm");
+        let conflict = |found: String, expected: &str| TechniqueError::Conflict {
+            technique: info.id,
+            found,
+            expected: expected.to_owned(),
+        };
+        let Some(px) = self.settings.tessellate_px else {
+            return match displacement_mm > 0.0 {
+                true => Err(conflict(
+                    format!("displacement-mm={displacement_mm} without tessellation"),
+                    "--tessellate PX with it",
+                )),
+                false => Ok(0.0),
+            };
+        };
+        if !info.tessellation {
+            return Err(TechniqueError::Untessellated { technique: info.id });
+        }
+        if !px.is_finite() || px < MIN_TESSELLATE_PX {
+            return Err(conflict(
+                format!("tessellation to edges of {px} pixels"),
+                &format!("at least {MIN_TESSELLATE_PX}"),
+            ));
+        }
+        if !self.device.features().tessellation_shader {
+            let missing = "tessellation shaders".to_owned();
+            return Err(TechniqueError::Unavailable { technique: info.id, missing });
+        }
+        Ok(displacement_mm * 1e-3)
+    }
+
     /// Records a frame with capacities for what can overflow.
     #[expect(clippy::too_many_arguments, reason = "the parts of one frame")]
     fn record(
@@ -251,6 +294,8 @@ impl Renderer {
             clip_from_world: view.clip_from_world,
             background_radiance: settings.environment.background_radiance.into(),
             view: &settings.view,
+            tessellate_px: settings.tessellate_px,
+            displacement_m: params.number(technique.info(), "displacement-mm") * 1e-3,
             buffers: self.import(&mut graph, constants, draws),
             extra_shaders: &self.extra_shaders,
             device: &self.device,
