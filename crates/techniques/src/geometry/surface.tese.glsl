@@ -13,7 +13,8 @@
 #include "frame.glsl"
 #include "displacement.glsl"
 
-layout(triangles, equal_spacing, ccw) in;
+// Vulkan looks at the patch with the origin in the upper left corner: clockwise there is the order of the three vertices.
+layout(triangles, equal_spacing, cw) in;
 
 layout(constant_id = 1) const float DISPLACEMENT_M = 0.0;
 
