@@ -96,6 +96,9 @@ pub struct SettingsRecord {
     /// Length on screen of the edges that surfaces were tessellated to, pixels; none without tessellation.
     #[serde(default)]
     pub tessellate_px: Option<f32>,
+    /// How far tessellated surfaces were displaced along each axis at most, mm.
+    #[serde(default)]
+    pub displacement_mm: f32,
     /// Seed of the lights; none where the scene's own lights shade.
     pub light_seed: Option<u64>,
     /// Version of the program.
@@ -266,6 +269,7 @@ mod tests {
                 reference: "forward".into(),
                 post: "smaa".into(),
                 tessellate_px: None,
+                displacement_mm: 0.0,
                 light_seed: Some(1),
                 version: "0".into(),
             },

@@ -35,6 +35,7 @@ fn run() -> Run {
             reference: "forward".into(),
             post: "smaa".into(),
             tessellate_px: None,
+            displacement_mm: 0.0,
             light_seed: Some(1),
             version: "0.1.0".into(),
         },

@@ -73,12 +73,6 @@ pub const COMMON: &[ParamInfo] = &[
         kind: ParamKind::Choice { values: &["center", "near", "scene"] },
         default: "center",
     },
-    ParamInfo {
-        key: "displacement-mm",
-        summary: "how far tessellated surfaces are displaced along each axis at most, mm; takes --tessellate",
-        kind: ParamKind::Number { min: 0.0, max: 100.0 },
-        default: "0",
-    },
 ];
 
 impl ParamKind {

@@ -15,7 +15,7 @@ use crate::{
     draw_list::{DrawList, DrawOptions, DrawOrder},
     error::TechniqueError,
     frame::{Frame, FrameBuffers},
-    geometry::MIN_TESSELLATE_PX,
+    geometry::{MAX_DISPLACEMENT_M, MIN_TESSELLATE_PX},
     light_list::LightList,
     params::Params,
     post::{self, Post},
@@ -50,6 +50,8 @@ pub struct Settings {
     pub post: Post,
     /// Tessellates surfaces to edges of that length on screen, pixels.
     pub tessellate_px: Option<f32>,
+    /// How far tessellated surfaces are displaced along each axis at most, m; nothing without tessellation.
+    pub displacement_m: f32,
 }
 
 impl Settings {
@@ -67,6 +69,7 @@ impl Settings {
             keep_hdr: false,
             post: Post::None,
             tessellate_px: None,
+            displacement_m: 0.0,
         }
     }
 }
@@ -163,7 +166,7 @@ impl Renderer {
     ) -> Result<Prepared, TechniqueError> {
         let info = technique.info();
         self.check(technique)?;
-        let displacement_m = self.check_tessellation(technique, params)?;
+        self.check_tessellation(technique)?;
         let options = DrawOptions {
             cull: params.text(info, "cull") == "frustum",
             order: match params.text(info, "order") {
@@ -175,7 +178,7 @@ impl Renderer {
         let settings = &self.settings;
         let view = View::new(settings);
         let mut draws = DrawList::new(&self.device, &self.scene, options)?;
-        draws.update(&self.scene, view.clip_from_world, view.eye_ws, displacement_m)?;
+        draws.update(&self.scene, view.clip_from_world, view.eye_ws, settings.displacement_m)?;
         let constants = self.device.create_buffer(&gpu::BufferDesc {
             name: "frame constants",
             bytes: size_of::<FrameConstants>() as u64,
@@ -232,42 +235,35 @@ impl Renderer {
         Ok(())
     }
 
-    /// Checks what is asked of tessellation; returns how far surfaces are displaced along each axis at most, m.
-    fn check_tessellation(
-        &self,
-        technique: &dyn Technique,
-        params: &Params,
-    ) -> Result<f32, TechniqueError> {
+    /// Checks what is asked of tessellation.
+    fn check_tessellation(&self, technique: &dyn Technique) -> Result<(), TechniqueError> {
         let info = technique.info();
-        let displacement_mm = params.number(info, "displacement-mm");
-        let conflict = |found: String, expected: &str| TechniqueError::Conflict {
-            technique: info.id,
-            found,
-            expected: expected.to_owned(),
+        let Settings { tessellate_px, displacement_m, .. } = self.settings;
+        let conflict = |found: String, expected: String| {
+            Err(TechniqueError::Conflict { technique: info.id, found, expected })
         };
-        let Some(px) = self.settings.tessellate_px else {
-            return match displacement_mm > 0.0 {
-                true => Err(conflict(
-                    format!("displacement-mm={displacement_mm} without tessellation"),
-                    "--tessellate PX with it",
-                )),
-                false => Ok(0.0),
+        if !(0.0..=MAX_DISPLACEMENT_M).contains(&displacement_m) {
+            let expected = format!("from 0 to {MAX_DISPLACEMENT_M} m");
+            return conflict(format!("a displacement of {displacement_m} m"), expected);
+        }
+        let Some(px) = tessellate_px else {
+            return match displacement_m > 0.0 {
+                true => conflict("displacement alone".to_owned(), "tessellation with it".to_owned()),
+                false => Ok(()),
             };
         };
         if !info.tessellation {
             return Err(TechniqueError::Untessellated { technique: info.id });
         }
         if !px.is_finite() || px < MIN_TESSELLATE_PX {
-            return Err(conflict(
-                format!("tessellation to edges of {px} pixels"),
-                &format!("at least {MIN_TESSELLATE_PX}"),
-            ));
+            let expected = format!("at least {MIN_TESSELLATE_PX}");
+            return conflict(format!("tessellation to edges of {px} pixels"), expected);
         }
         if !self.device.features().tessellation_shader {
             let missing = "tessellation shaders".to_owned();
             return Err(TechniqueError::Unavailable { technique: info.id, missing });
         }
-        Ok(displacement_mm * 1e-3)
+        Ok(())
     }
 
     /// Records a frame with capacities for what can overflow.
@@ -295,7 +291,7 @@ impl Renderer {
             background_radiance: settings.environment.background_radiance.into(),
             view: &settings.view,
             tessellate_px: settings.tessellate_px,
-            displacement_m: params.number(technique.info(), "displacement-mm") * 1e-3,
+            displacement_m: settings.displacement_m,
             buffers: self.import(&mut graph, constants, draws),
             extra_shaders: &self.extra_shaders,
             device: &self.device,

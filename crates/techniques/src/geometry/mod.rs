@@ -21,6 +21,8 @@ use crate::{
 pub const MIN_TESSELLATE_PX: f32 = 1.0;
 /// Longest edge that tessellation aims at, pixels.
 pub const MAX_TESSELLATE_PX: f32 = 64.0;
+/// Farthest displacement along each axis, m: beyond an eighth of the field's period the surface would fold.
+pub const MAX_DISPLACEMENT_M: f32 = 0.1;
 
 /// Shaders of one kind of surface.
 pub struct SurfaceShaders {
