@@ -746,8 +746,7 @@ impl Builder<'_> {
     ) -> Result<gpu::Pipeline, GraphError> {
         let shaders = state.shaders();
         // In the order of `shaders`: each stage takes the constants that it has.
-        let constants: Vec<_> =
-            shaders.iter().map(|shader| constants_of(shader, &state.constants)).collect();
+        let constants: Vec<_> = shaders.iter().map(|shader| constants_of(shader, &state.constants)).collect();
         let stage_code = |stage: Stage| {
             let (shader, constants) =
                 shaders.iter().zip(&constants).find(|(shader, _)| shader.stage == stage)?;

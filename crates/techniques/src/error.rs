@@ -82,7 +82,7 @@ pub enum TechniqueError {
         expected: String,
     },
     /// Tessellated surfaces, which the technique does not draw.
-    #[error("{technique}: found --tessellate, expected a technique that draws what tessellation makes (`techniques --json`)")]
+    #[error("{technique}: found --tessellate, expected a technique that can (`techniques --json` tells)")]
     Untessellated {
         /// The technique.
         technique: &'static str,
