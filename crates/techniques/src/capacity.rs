@@ -8,8 +8,15 @@ use serde::Serialize;
 
 use crate::{error::TechniqueError, frame::Frame};
 
-/// A capacity that leaves less than this unused is kept; one that leaves more than half of itself unused as well is cut.
+/// A capacity that leaves less than this unused is kept; one that leaves more than three quarters of itself unused as well is
+/// cut.
 const SLACK: u32 = 4096;
+
+/// Room beyond what a frame needed, eighths of it, where the next frame of the same view needs the same.
+pub(crate) const STEADY: u32 = 1;
+/// The same where what is needed depends on the order in which the device runs threads: 133,822 triangles through a cache with
+/// locks after 103,000 in the frame before (NVIDIA H200).
+pub(crate) const UNSTEADY: u32 = 8;
 
 /// What a frame counted of something that can overflow.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -33,6 +40,7 @@ pub(crate) struct Demand {
     resource: ResourceId,
     capacity: u32,
     fixed: bool,
+    slack_eighths: u32,
 }
 
 impl Demand {
@@ -77,8 +85,13 @@ impl Capacities {
         if counters.iter().all(fits) {
             return None;
         }
-        // An eighth more than needed: the next frame of a moving view needs a little more or less.
-        let room = |c: &Counter| c.needed.saturating_add(c.needed / 8).saturating_add(SLACK / 8);
+        // More than needed: the next frame may need a little more or less.
+        let demands = self.demands.borrow();
+        let slack = |name: &str| demands.iter().find(|d| d.name == name).map_or(STEADY, |d| d.slack_eighths);
+        let room = |c: &Counter| {
+            let more = u64::from(c.needed) * u64::from(slack(&c.name)) / 8 + u64::from(SLACK / 8);
+            u32::try_from(u64::from(c.needed) + more).unwrap_or(u32::MAX)
+        };
         let known =
             counters.iter().map(|c| (c.name.clone(), if fits(c) { c.capacity } else { room(c) })).collect();
         Some(Self { known, demands: RefCell::default() })
@@ -102,8 +115,22 @@ impl Frame<'_> {
         capacity: u32,
         fixed: bool,
     ) {
+        self.watch_with(graph, name, counter, capacity, fixed, STEADY);
+    }
+
+    /// As [`Self::watch`], with another share of room beyond what was needed: [`STEADY`] or [`UNSTEADY`].
+    pub(crate) fn watch_with(
+        &self,
+        graph: &mut Graph,
+        name: &'static str,
+        counter: &BufferHandle,
+        capacity: u32,
+        fixed: bool,
+        slack_eighths: u32,
+    ) {
         let resource = graph.keep(counter);
-        self.capacities.demands.borrow_mut().push(Demand { name, resource, capacity, fixed });
+        let demand = Demand { name, resource, capacity, fixed, slack_eighths };
+        self.capacities.demands.borrow_mut().push(demand);
     }
 }
 

@@ -195,6 +195,45 @@ pub fn gbuffer_list(w: &Workload, fill_in_compute: bool) -> Cost {
     }
 }
 
+/// The project's own: DAIS (Schied and Dachsbacher 2015) with the triangle buffer filled from the visibility buffer. Two floats
+/// a sample, depth and a triangle's name, written and read twice; twenty floats for each triangle that shows, at most all
+/// of them and at most one a pixel and surface, written once and read for every surface.
+pub fn dais(w: &Workload) -> Cost {
+    let (stored, shaded) = (w.shading_samples, w.expected_samples);
+    let triangles = (w.object_vertices / 3.0).min(w.pixels * shaded);
+    Cost {
+        cmd: w.objects * w.object_command,
+        proc: 2.0 * w.vertices() + w.light_fragments * shaded * w.evaluation,
+        mem: 2.0 * w.pixels * stored + 20.0 * triangles,
+        band: 2.0 * w.vertex_traffic()
+            + 2.0 * w.object_fragments * stored
+            + 2.0 * w.pixels * stored
+            + 20.0 * triangles
+            + w.pixels * shaded * (20.0 + w.object_fragment_traffic)
+            + w.light_fragments * shaded * w.light_fragment_traffic,
+    }
+}
+
+/// The project's own: [`dais`] with a float a sample (depth), a float a pixel (the head) and two a surface where a pixel shows
+/// several; the scene is drawn twice.
+pub fn dais_list(w: &Workload) -> Cost {
+    let (stored, shaded) = (w.shading_samples, w.expected_samples);
+    let triangles = (w.object_vertices / 3.0).min(w.pixels * shaded);
+    let lists = w.pixels * (1.0 + 2.0 * (shaded - 1.0).max(0.0));
+    Cost {
+        cmd: 2.0 * w.objects * w.object_command,
+        proc: 3.0 * w.vertices() + w.light_fragments * shaded * w.evaluation,
+        mem: w.pixels * stored + lists + 20.0 * triangles,
+        band: 3.0 * w.vertex_traffic()
+            + w.object_fragments * stored
+            + w.pixels * stored
+            + 2.0 * lists
+            + 20.0 * triangles
+            + w.pixels * shaded * (20.0 + w.object_fragment_traffic)
+            + w.light_fragments * shaded * w.light_fragment_traffic,
+    }
+}
+
 /// TD, section 4.8.
 pub fn tiled_deferred(w: &Workload) -> Cost {
     let shared = w.light_fragments / w.pixels_a_tile;

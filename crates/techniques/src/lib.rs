@@ -40,6 +40,7 @@ mod scene_gpu;
 pub mod supersample;
 mod technique;
 mod textures;
+pub mod triangle_buffer;
 pub mod view;
 pub mod volumes;
 

@@ -24,6 +24,9 @@ use crate::{
     view, volumes,
 };
 
+/// Times that a view is recorded at most until everything that can overflow has room.
+const RECORDINGS_MAX: u32 = 8;
+
 /// Layout in which uploads leave images.
 const UPLOADED: vk::ImageLayout = vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL;
 
@@ -188,7 +191,7 @@ impl Renderer {
         constants.write(0, bytemuck::bytes_of(&view.constants(settings, &self.lights)))?;
 
         let mut capacities = Capacities::default();
-        loop {
+        for _ in 1..RECORDINGS_MAX {
             let mut prepared =
                 self.record(technique, params, &view, &draws, &constants, &capacities, &also)?;
             if !capacities.is_watched() {
@@ -201,6 +204,8 @@ impl Renderer {
                 None => return Ok(prepared),
             }
         }
+        // What it needs still grows: its counters tell what it drops.
+        self.record(technique, params, &view, &draws, &constants, &capacities, &also)
     }
 
     fn check(&self, technique: &dyn Technique) -> Result<(), TechniqueError> {

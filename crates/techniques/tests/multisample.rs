@@ -14,11 +14,20 @@ fn counts(device: &gpu::Device) -> Vec<u32> {
     [4, 8].into_iter().filter(|count| device.features().supports_samples(*count, false)).collect()
 }
 
-/// Parameters that change how a technique works: of each group one, where the technique has it.
-const COMPARED: &[&[(&str, &str)]] = &[
-    &[("lights", "all"), ("lights", "tiled")],
-    &[("visibility", "raster"), ("fill", "raster"), ("visibility", "compute")],
-];
+/// Ways in which a technique works, by its parameters, besides its lights.
+fn ways(id: &str) -> &'static [&'static [(&'static str, &'static str)]] {
+    match id {
+        "gbuffer-list" => &[&[("visibility", "raster")], &[("fill", "raster")], &[("visibility", "compute")]],
+        "dais" => &[
+            &[("visibility", "raster")],
+            &[("visibility", "compute")],
+            &[("fill", "cache")],
+            &[("fill", "cache"), ("cache-buckets", "1")],
+        ],
+        "dais-list" => &[&[], &[("cache-buckets", "1")]],
+        _ => &[&[]],
+    }
+}
 
 /// A technique's parameters from `key=value` words.
 fn params(technique: &dyn Technique, sets: &[(&str, &str)]) -> Params {
@@ -34,11 +43,11 @@ fn variants() -> Vec<(&'static dyn Technique, Params, String)> {
     let mut all = Vec::new();
     for technique in registry().iter().copied().filter(|t| t.info().samples.contains(&4)) {
         let info = technique.info();
-        let has = |key: &str| info.params.iter().any(|p| p.key == key);
-        let mut sets: Vec<Vec<(&str, &str)>> = vec![Vec::new()];
-        for group in COMPARED.iter().filter(|group| group.iter().all(|(key, _)| has(key))) {
-            sets = sets.iter().flat_map(|set| group.iter().map(|one| [&set[..], &[*one]].concat())).collect();
-        }
+        let lights: &[&[(&str, &str)]] = match info.params.iter().any(|p| p.key == "lights") {
+            true => &[&[("lights", "all")], &[("lights", "tiled")]],
+            false => &[&[]],
+        };
+        let sets = lights.iter().flat_map(|one| ways(info.id).iter().map(|way| [*one, *way].concat()));
         for set in sets {
             let words: Vec<String> = set.iter().map(|(key, value)| format!("{key}={value}")).collect();
             all.push((technique, params(technique, &set), format!("{} {}", info.id, words.join(" "))));
@@ -146,6 +155,17 @@ fn lists_equal_the_deduplicated_samples() {
     for samples in counts(&gpu) {
         let settings = Settings { samples, ..stage.settings((320, 180), 100) };
         let dedup = stage.image(find("deferred-dedup").unwrap(), &settings);
+        for id in ["dais", "dais-list"] {
+            for way in ways(id) {
+                let technique = find(id).unwrap();
+                let db = psnr(
+                    &dedup,
+                    &image_of(&mut stage.prepare_with(technique, &settings, &params(technique, way))),
+                );
+                println!("{samples} samples: {id} {way:?}: {db:.2} dB to deferred-dedup");
+                assert!(db >= 45.0, "{samples} samples: {id} {way:?}: {db:.2} dB to deferred-dedup");
+            }
+        }
         for sets in [
             &[("visibility", "raster")][..],
             &[("fill", "compute"), ("pointer", "wide")],

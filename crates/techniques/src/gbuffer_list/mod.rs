@@ -188,7 +188,7 @@ impl Layout {
 }
 
 /// Passes where no fragment before has set the stencil bit, and leaves it.
-const NOT_TAKEN: StencilTest = {
+pub(crate) const NOT_TAKEN: StencilTest = {
     let face = StencilFace { compare: vk::CompareOp::NOT_EQUAL, ..StencilFace::KEEP };
     StencilTest { front: face, back: face, compare_mask: 0xff, write_mask: 0 }
 };
@@ -259,6 +259,22 @@ fn empty_lists(
     let blocks = graph.clear_buffer("gbuffer-list/clear blocks", blocks, 0);
     let count = graph.clear_buffer("gbuffer-list/clear count", count, 0);
     Ok((blocks, count, flagged))
+}
+
+/// Declares the claims by which masked surfaces of one depth share the samples of a pixel (`claims.glsl`); none where the scene
+/// has no masked surfaces.
+pub(crate) fn claims(
+    graph: &mut Graph,
+    frame: &Frame<'_>,
+    technique: &str,
+    samples: u32,
+) -> Option<BufferHandle> {
+    frame.scene.has_masked().then(|| {
+        let bits = if samples > 8 { 16 } else { 8 };
+        let pixels = u64::from(frame.width_px) * u64::from(frame.height_px);
+        let claims = graph.buffer(&format!("{technique}/claims"), 4 * (pixels * bits).div_ceil(32));
+        graph.clear_buffer(&format!("{technique}/clear claims"), claims, 0)
+    })
 }
 
 /// Specialization constants of shaders that build the lists.
@@ -350,12 +366,7 @@ fn fill_by_raster(graph: &mut Graph, frame: &Frame<'_>, layout: &Layout) -> Resu
     fill.masked_stencil = Some(NOT_TAKEN);
     fill.constants = build_constants(frame, layout);
     let (blocks, count, flagged) = empty_lists(graph, frame, layout)?;
-    let claims = frame.scene.has_masked().then(|| {
-        let bits = if layout.samples > 8 { 16 } else { 8 };
-        let pixels = u64::from(frame.width_px) * u64::from(frame.height_px);
-        let claims = graph.buffer("gbuffer-list/claims", 4 * (pixels * bits).div_ceil(32));
-        graph.clear_buffer("gbuffer-list/clear claims", claims, 0)
-    });
+    let claims = claims(graph, frame, INFO.id, layout.samples);
 
     let mut pass = graph.raster("gbuffer-list/depth");
     frame.bind_scene(&mut pass);

@@ -167,9 +167,12 @@ pub fn shade(
     let tiled = lights == "tiled";
     let tag = if tiled { format!("{source}-tiled") } else { source.to_owned() };
     let name = format!("multisample/shade.comp#{tag}");
-    // Lists hold emission in their blocks.
-    let shader =
-        frame.shader(&if source.starts_with("list") { name } else { emission_variant(frame, &name) })?;
+    // Lists hold emission in their blocks, a triangle buffer has no need to.
+    let shader = frame.shader(&if source.starts_with("list") || source.starts_with("dais") {
+        name
+    } else {
+        emission_variant(frame, &name)
+    })?;
     let radiance =
         graph.image(&format!("{technique}/radiance"), frame.image_info(vk::Format::R16G16B16A16_SFLOAT));
     let mut pass = frame.compute(graph, &format!("{technique}/shade"), &shader);

@@ -12,6 +12,10 @@ layout(set = 0, binding = 8) uniform SAMPLED_IMAGE gbuffer_depth;
 
 #if defined(SOURCE_DEDUP)
 #include "multisample/source_dedup.glsl"
+#elif defined(SOURCE_DAIS)
+#include "dais/source_dais.glsl"
+#elif defined(SOURCE_DAIS_LIST)
+#include "dais_list/source_dais_list.glsl"
 #elif defined(SOURCE_LIST)
 #include "gbuffer_list/source_list.glsl"
 #else

@@ -1,0 +1,33 @@
+// Fills the visibility buffer with references into the triangle buffer (Schied and Dachsbacher 2015, section 3.1, Figure 3, and
+// section 4.1), after a depth pre-pass, with an equal test.
+//
+// Out: reference, 24 bits, and coverage, 8 bits, as RGBA8 (Figure 4); what memoize.glsl writes. Departures: a triangle's ID stands
+// for its vertices, which can be fetched by it; the coverage is what passed the equal test, and where a later triangle of the
+// same depth overwrites a sample the shading pass keeps its first claim.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_post_depth_coverage : require
+#include "dais/memoize.glsl"
+#ifdef ALPHA_MASK
+#define WITH_UV
+#include "surface_in.glsl"
+#else
+layout(location = 0) flat in uvec2 draw_material;
+#endif
+
+layout(early_fragment_tests) in;
+layout(post_depth_coverage) in;
+
+layout(location = 0) out vec4 visibility_sample;
+
+void main() {
+#ifdef ALPHA_MASK
+    visible_base_color(load_material(draw_material.y), surface_point());
+#endif
+    visibility_sample = vec4(1.0);
+    uint coverage = uint(gl_SampleMaskIn[0]);
+    if (!gl_HelperInvocation && coverage != 0u) {
+        uint place = memoized(draw_material.x << TRIANGLE_BITS | uint(gl_PrimitiveID));
+        visibility_sample = unpackUnorm4x8(min(place, 0xfffffeu) | coverage << 24);
+    }
+}

@@ -1,0 +1,97 @@
+// The memoization cache: triangle to its place in the triangle buffer (Schied and Dachsbacher 2015, section 4.1; Liktor and
+// Dachsbacher 2012). Every fragment looks its triangle up; one that finds nothing takes the bucket's lock, a slot of the
+// triangle buffer, and stores the triangle: its ID in the first word of its record, for the derivative pass.
+//
+// No lock can hang. A fragment that fails to take a lock does not wait inside the loop's turn but polls again, at most POLLS times;
+// one that takes it lets go within the same turn, whatever the other lanes of its subgroup do. After that the triangle is
+// stored once more, which costs memory and nothing else.
+#ifndef AFTERLIGHT_MEMOIZE
+#define AFTERLIGHT_MEMOIZE
+#include "triangle_buffer/record.glsl"
+
+// Triangle ID and its place, two entries a bucket. Written place first, ID last; an ID that is being replaced is none. Volatile:
+// a look-up reads the ID twice, and a compiler that joins the reads takes another triangle's place (32 dB on lavapipe).
+layout(set = 0, binding = 10, scalar) coherent volatile buffer CacheEntries {
+    uvec2 cache_entries[];
+};
+layout(set = 0, binding = 11, scalar) coherent buffer CacheLocks {
+    uint cache_locks[];
+};
+layout(set = 0, binding = 12, scalar) buffer TriangleCount {
+    uint triangles_needed;
+    uint triangles_dropped;
+};
+layout(set = 0, binding = 14, scalar) writeonly buffer TriangleBuffer {
+    uint triangle_buffer[];
+};
+layout(constant_id = 11) const uint TRIANGLE_CAPACITY = 0u;
+layout(constant_id = 12) const uint CACHE_BUCKETS = 8192u;
+layout(constant_id = 13) const uint POLLS = 32u;
+
+const uint NOT_CACHED = 0xffffffffu;
+const uint NO_ID = 0u;      // the cleared cache; IDs are stored plus one
+
+// Neighbouring triangles, which are drawn at the same time, spread over the buckets.
+uint bucket_of(uint id) {
+    return (id * 2654435761u >> 16) % CACHE_BUCKETS;
+}
+
+uint look_up(uint bucket, uint id) {
+    for (uint i = bucket * 2u; i < bucket * 2u + 2u; ++i) {
+        if (cache_entries[i].x == id + 1u) {
+            memoryBarrierBuffer();
+            uint place = cache_entries[i].y;
+            memoryBarrierBuffer();
+            // Still the same entry: the place is its own.
+            if (cache_entries[i].x == id + 1u) {
+                return place;
+            }
+        }
+    }
+    return NOT_CACHED;
+}
+
+uint store_triangle(uint id) {
+    uint place = atomicAdd(triangles_needed, 1u);
+    if (place < TRIANGLE_CAPACITY) {
+        triangle_buffer[place * RECORD_WORDS] = id;
+    } else {
+        atomicAdd(triangles_dropped, 1u);
+    }
+    return place;
+}
+
+uint memoized(uint id) {
+    uint bucket = bucket_of(id);
+    for (uint poll = 0u; poll < POLLS; ++poll) {
+        uint place = look_up(bucket, id);
+        if (place != NOT_CACHED) {
+            return place;
+        }
+        if (atomicCompSwap(cache_locks[bucket], 0u, 1u) == 0u) {
+            // Another may have stored it between look-up and lock.
+            place = look_up(bucket, id);
+            if (place == NOT_CACHED) {
+                place = store_triangle(id);
+                // The older entry goes: the first is moved into the second.
+                uvec2 older = cache_entries[bucket * 2u];
+                cache_entries[bucket * 2u + 1u].x = NO_ID;
+                memoryBarrierBuffer();
+                cache_entries[bucket * 2u + 1u].y = older.y;
+                memoryBarrierBuffer();
+                cache_entries[bucket * 2u + 1u].x = older.x;
+                cache_entries[bucket * 2u].x = NO_ID;
+                memoryBarrierBuffer();
+                cache_entries[bucket * 2u].y = place;
+                memoryBarrierBuffer();
+                cache_entries[bucket * 2u].x = id + 1u;
+            }
+            memoryBarrierBuffer();
+            atomicExchange(cache_locks[bucket], 0u);
+            return place;
+        }
+    }
+    return store_triangle(id);
+}
+
+#endif

@@ -1,0 +1,210 @@
+//! `dais`: deferred attribute interpolation shading: triangle IDs at every sample, visible triangles stored once.
+
+// ORDER: 140
+
+use afterlight_graph::{BufferHandle, DepthTest, Graph, ImageHandle, Load, RasterPass, gpu::vk};
+
+use crate::{
+    ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, ParamInfo, ParamKind, Params, Source, Technique,
+    TechniqueError, compute_raster,
+    cost::{self, Cost, Workload},
+    geometry::Surfaces,
+    multisample::{self, NO_TRIANGLE_RGBA8},
+    triangle_buffer::{self, Visible},
+};
+
+/// The technique.
+pub static TECHNIQUE: Dais = Dais;
+
+/// See the module.
+pub struct Dais;
+
+const FILL: ParamInfo = ParamInfo {
+    key: "fill",
+    summary: "who fills the triangle buffer: compute over a finished visibility buffer, or fragments through a memoization cache after a depth pre-pass (the paper's)",
+    kind: ParamKind::Choice { values: &["resolve", "cache"] },
+    default: "resolve",
+};
+/// Size of the memoization cache.
+pub(crate) const CACHE_BUCKETS: ParamInfo = ParamInfo {
+    key: "cache-buckets",
+    summary: "buckets of two entries in the memoization cache through which fragments store triangles",
+    kind: ParamKind::Integer { min: 1, max: 1 << 16 },
+    default: "8192",
+};
+
+/// Most triangles that a visibility sample's 24 bits tell apart; all ones with full coverage is the background.
+const REFERENCES_MAX: u32 = (1 << 24) - 2;
+/// Most samples of a visibility sample's coverage mask.
+const COVERAGE_SAMPLES_MAX: u32 = 8;
+/// Polls of a locked bucket before a triangle is stored once more. The lock is held for some tens of instructions.
+const POLLS: u32 = 32;
+
+/// The memoization cache of a frame (section 4.1).
+pub(crate) struct Cache {
+    entries: BufferHandle,
+    locks: BufferHandle,
+    buckets: u32,
+}
+
+impl Cache {
+    /// Declares an empty cache.
+    pub fn new(graph: &mut Graph, frame: &Frame<'_>, info: &Info) -> Self {
+        let buckets = frame.params.number(info, CACHE_BUCKETS.key) as u32;
+        let technique = info.id;
+        let entries = graph.buffer(&format!("{technique}/cache entries"), 16 * u64::from(buckets));
+        let locks = graph.buffer(&format!("{technique}/cache locks"), 4 * u64::from(buckets));
+        Self {
+            entries: graph.clear_buffer(&format!("{technique}/clear cache"), entries, 0),
+            locks: graph.clear_buffer(&format!("{technique}/clear locks"), locks, 0),
+            buckets,
+        }
+    }
+
+    /// Specialization constants of `dais/memoize.glsl`.
+    pub fn constants(&self, list: &triangle_buffer::List) -> Vec<(String, u32)> {
+        [("TRIANGLE_CAPACITY", list.capacity), ("CACHE_BUCKETS", self.buckets), ("POLLS", POLLS)]
+            .map(|(name, value)| (name.to_owned(), value))
+            .to_vec()
+    }
+
+    /// Binds it to the pass whose fragments store triangles.
+    pub fn bind(self, pass: &mut RasterPass<'_>) {
+        let _entries = pass.write("CacheEntries", self.entries);
+        let _locks = pass.write("CacheLocks", self.locks);
+    }
+}
+
+static INFO: Info = Info {
+    id: "dais",
+    title: "Deferred attribute interpolation shading",
+    summary: "Samples hold triangle IDs; triangles that show are stored once, by screen-space derivatives, and shaded once a pixel.",
+    sources: &[
+        Source { key: "schied-2015", section: "3, 4" },
+        Source { key: "liktor-2012", section: "4" },
+        Source { key: "schueler-2007", section: "all" },
+    ],
+    answers: Answers {
+        surface: "triangle IDs and a triangle buffer",
+        lights: "loop over all, or tiles",
+        schedule: "compute, a thread a pixel",
+        resolve: "once a triangle",
+    },
+    appendix_a: AppendixA {
+        id: "D++",
+        intersect: "dec",
+        transparency: "n",
+        hardware_msaa: "y",
+        light_access: "seq",
+        material_access: "seq",
+        rates_decoupled: "y, n",
+    },
+    // Texture gradients are analytic.
+    exactness: Exactness::Exact { min_psnr_db: 45.0 },
+    params: &[multisample::LIGHTS, FILL, CACHE_BUCKETS, compute_raster::VISIBILITY, compute_raster::SMALL],
+    needs: &[],
+    samples: ANY_SAMPLES,
+    views: multisample::VIEWS,
+};
+
+impl Technique for Dais {
+    fn info(&self) -> &Info {
+        &INFO
+    }
+
+    fn predict(&self, workload: &Workload, _: &Params) -> Cost {
+        cost::dais(workload)
+    }
+
+    fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
+        if frame.params.text(&INFO, FILL.key) == "cache" {
+            return record_cached(graph, frame);
+        }
+        let visible = match compute_raster::is_chosen(frame, &INFO)? {
+            true => {
+                let keys = compute_raster::rasterize(graph, frame, &INFO, frame.samples)?;
+                Visible::Keys { keys, samples: frame.samples }
+            }
+            false => raster_ids(graph, frame)?,
+        };
+        let triangles = triangle_buffer::fill(graph, frame, INFO.id, &visible)?;
+        let source = format!("dais{}", visible.tag('-'));
+        let lights = frame.params.text(&INFO, multisample::LIGHTS.key);
+        multisample::shade(graph, frame, INFO.id, (&source, frame.samples), lights, |pass| {
+            visible.bind(pass, true);
+            triangles.bind(pass);
+        })
+    }
+}
+
+/// The paper's pipeline (Figure 3): depth, then fragments that store their triangles through the memoization cache and write
+/// references, then derivatives, then Listing 1.
+fn record_cached(graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
+    if !frame.features().post_depth_coverage {
+        return Err(TechniqueError::Unavailable {
+            technique: INFO.id,
+            missing: "post-depth coverage for fill=cache (fill=resolve does without)".to_owned(),
+        });
+    }
+    if frame.samples > COVERAGE_SAMPLES_MAX {
+        return Err(TechniqueError::Conflict {
+            technique: INFO.id,
+            found: format!("fill=cache with {} samples", frame.samples),
+            expected: format!("at most {COVERAGE_SAMPLES_MAX} samples, or fill=resolve"),
+        });
+    }
+    let references = graph.image("dais/references", frame.multisampled_info(vk::Format::R8G8B8A8_UNORM));
+    let depth = graph.image("dais/depth", frame.multisampled_info(vk::Format::D32_SFLOAT));
+    let cache = Cache::new(graph, frame, &INFO);
+    let list = triangle_buffer::List::new(graph, frame, INFO.id, REFERENCES_MAX)?;
+    let depth_only = Surfaces::depth_only(frame)?;
+    let mut fill = Surfaces::new(
+        frame,
+        ("geometry/surface.vert#position", Some("dais/fill.frag")),
+        ("geometry/surface.vert#uv", "dais/fill.frag#mask"),
+    )?
+    .depth(DepthTest::EQUAL);
+    fill.constants = cache.constants(&list);
+
+    let mut pass = graph.raster("dais/depth");
+    frame.bind_scene(&mut pass);
+    let depth = pass.depth(depth, Load::Clear(0.0));
+    depth_only.draw(frame, &mut pass);
+    pass.finish();
+
+    let mut pass = graph.raster("dais/fill");
+    frame.bind_scene(&mut pass);
+    let references = pass.color(references, Load::Clear(NO_TRIANGLE_RGBA8));
+    pass.depth_read_only(&depth);
+    cache.bind(&mut pass);
+    let list = list.written_by(&mut pass);
+    fill.draw(frame, &mut pass);
+    pass.finish();
+
+    let triangles = list.derivatives(graph, frame, INFO.id)?;
+    let visible = Visible::Ids { ids: references, depth, samples: frame.samples };
+    let source = format!("dais-refs{}", visible.tag('-'));
+    let lights = frame.params.text(&INFO, multisample::LIGHTS.key);
+    multisample::shade(graph, frame, INFO.id, (&source, frame.samples), lights, |pass| {
+        visible.bind(pass, true);
+        pass.read("TriangleBuffer", &triangles);
+    })
+}
+
+/// Declares the pass `dais/ids`: a triangle ID and depth at every sample.
+fn raster_ids(graph: &mut Graph, frame: &Frame<'_>) -> Result<Visible, TechniqueError> {
+    let ids = graph.image("dais/ids", frame.multisampled_info(vk::Format::R8G8B8A8_UNORM));
+    let depth = graph.image("dais/depth", frame.multisampled_info(vk::Format::D32_SFLOAT));
+    let surfaces = Surfaces::new(
+        frame,
+        ("geometry/surface.vert#position", Some("visibility/ids.frag#rgba8")),
+        ("geometry/surface.vert#uv", "visibility/ids.frag#rgba8-mask"),
+    )?;
+    let mut pass = graph.raster("dais/ids");
+    frame.bind_scene(&mut pass);
+    let ids = pass.color(ids, Load::Clear(NO_TRIANGLE_RGBA8));
+    let depth = pass.depth(depth, Load::Clear(0.0));
+    surfaces.draw(frame, &mut pass);
+    pass.finish();
+    Ok(Visible::Ids { ids, depth, samples: frame.samples })
+}

@@ -1,0 +1,53 @@
+// Surfaces of a pixel from its list of references into the triangle buffer (Schied and Dachsbacher 2015, section 4.3).
+#include "triangle_buffer/interpolate.glsl"
+
+layout(set = 0, binding = 9, scalar) readonly buffer Heads {
+    uint heads[];
+};
+layout(set = 0, binding = 10, scalar) readonly buffer Nodes {
+    uvec2 nodes[];
+};
+
+ivec2 source_pixel;
+uint source_link;           // head or next node plus one; 0 at the end
+uint source_sum;
+uint source_background;     // samples without a surface
+
+// Bounds of what a tile's lights must reach, from the depth buffer.
+float source_distance(ivec2 pixel, uint i) {
+    float depth = SAMPLE_DEPTH(pixel, i);
+    return depth == 0.0 ? -1.0 : distance_from_depth(depth);
+}
+
+void source_begin(ivec2 pixel) {
+    source_pixel = pixel;
+    source_link = heads[uint(pixel.y) * frame.size_px.x + uint(pixel.x)];
+    source_sum = 0u;
+    source_background = 0u;
+}
+
+bool source_next(out Surface s, out uint weight) {
+    if (source_link == 0u) {
+        // Samples that were dropped for want of nodes are not the background: the depth buffer tells.
+        for (uint i = 0u; i < SAMPLES && source_sum < SAMPLES; ++i) {
+            source_background += SAMPLE_DEPTH(source_pixel, i) == 0.0 ? 1u : 0u;
+        }
+        return false;
+    }
+    uint place = source_link & 0x7fffffffu;
+    weight = SAMPLES;
+    if ((source_link & 0x80000000u) != 0u) {
+        source_link = 0u;
+    } else {
+        uvec2 node = nodes[source_link - 1u];
+        place = node.x & 0xfffffffu;
+        weight = (node.x >> 28) + 1u;
+        source_link = node.y;
+    }
+    source_sum += weight;
+    uint material;
+    SurfacePoint p = interpolated_point(place, source_pixel, material);
+    MaterialData m = load_material(material);
+    s = surface_at(m, p, base_color_at(m, p).rgb);
+    return true;
+}

@@ -1,0 +1,246 @@
+//! The stage that stores the triangles which show, by screen-space derivatives of their attributes (Schied and Dachsbacher
+//! 2015, sections 3.1, 3.2 and 4.2).
+//!
+//! The paper fills the triangle buffer from a raster pass through a memoization cache with locks, and wishes for a way without
+//! a depth pre-pass. Here it is filled from a finished visibility buffer: a bit a triangle marks what shows, counts and a scan
+//! turn bits into places, and a thread a marked triangle writes its record. No lock, no cache, each triangle once, in the order
+//! of draws.
+
+use afterlight_graph::{BufferHandle, Graph, ImageHandle, RasterPass};
+
+use crate::{
+    capacity,
+    error::TechniqueError,
+    frame::{Frame, Slots},
+    scene_gpu::DRAW_TRIANGLES,
+};
+
+/// Triangles that the first frame of a view has room for: few, since that frame is run to count what the view needs.
+const FIRST_GUESS: u32 = 1 << 12;
+/// Words of 32 bits for a draw's triangles.
+const WORDS_A_DRAW: u64 = DRAW_TRIANGLES as u64 / 32;
+/// Triangles of a group: `local_size_x` in `derivatives.comp.glsl`.
+const GROUP_TRIANGLES: u32 = 128;
+
+/// What samples show: triangle IDs, or keys of `compute_raster`.
+pub enum Visible {
+    /// Triangle IDs, four bytes as RGBA8, and depth, of `samples` samples a pixel.
+    Ids {
+        /// `draw << 10 | triangle`.
+        ids: ImageHandle,
+        /// Reversed.
+        depth: ImageHandle,
+        /// Samples a pixel.
+        samples: u32,
+    },
+    /// Depth and place in the order of draws.
+    Keys {
+        /// A key a sample.
+        keys: BufferHandle,
+        /// Samples a pixel.
+        samples: u32,
+    },
+}
+
+impl Visible {
+    /// Samples a pixel.
+    pub fn samples(&self) -> u32 {
+        match self {
+            Self::Ids { samples, .. } | Self::Keys { samples, .. } => *samples,
+        }
+    }
+
+    /// Tag of shader variants that read it, with a separator before it; empty for the plain one.
+    pub fn tag(&self, separator: char) -> String {
+        match self {
+            Self::Ids { samples: 1, .. } => format!("{separator}one"),
+            Self::Ids { .. } => String::new(),
+            Self::Keys { .. } => format!("{separator}keys"),
+        }
+    }
+
+    /// Binds what shaders read of it; those that shade read depth as well.
+    pub fn bind(&self, pass: &mut impl Slots, with_depth: bool) {
+        match self {
+            Self::Ids { ids, depth, .. } => {
+                pass.read_image("ids", ids);
+                if with_depth {
+                    pass.read_image("gbuffer_depth", depth);
+                }
+            }
+            Self::Keys { keys, .. } => pass.read_buffer("SampleKeys", keys),
+        }
+    }
+}
+
+/// A filled triangle buffer with the index from triangles to their places.
+pub struct TriangleBuffer {
+    records: BufferHandle,
+    bits: BufferHandle,
+    before: BufferHandle,
+    base: BufferHandle,
+}
+
+impl TriangleBuffer {
+    /// Binds what `triangle_buffer/index.glsl` and `triangle_buffer/interpolate.glsl` read.
+    pub fn bind(&self, pass: &mut impl Slots) {
+        pass.read_buffer("TriangleBuffer", &self.records);
+        pass.read_buffer("VisibleBits", &self.bits);
+        pass.read_buffer("VisibleBefore", &self.before);
+        pass.read_buffer("DrawBase", &self.base);
+    }
+}
+
+/// Bytes of a triangle's record: 80, more where the scene has second texture coordinates or vertex colours.
+fn record_bytes(frame: &Frame<'_>) -> u64 {
+    let has = |name: &str| frame.scene.constants.iter().any(|(known, value)| *known == name && *value != 0);
+    80 + 24 * u64::from(has("HAS_UV1")) + 48 * u64::from(has("HAS_VERTEX_COLOR"))
+}
+
+/// A triangle buffer that fragments append to: a list of triangle IDs, one in the first word of each record.
+pub struct List {
+    records: BufferHandle,
+    count: BufferHandle,
+    /// Triangles that there is room for.
+    pub capacity: u32,
+}
+
+impl List {
+    /// Declares an empty list of at most `most` triangles.
+    ///
+    /// # Errors
+    /// More triangles than `most` or than one binding holds.
+    pub fn new(
+        graph: &mut Graph,
+        frame: &Frame<'_>,
+        technique: &str,
+        most: u32,
+    ) -> Result<Self, TechniqueError> {
+        let (capacity, bytes) = room(frame, technique)?;
+        if capacity > most {
+            let what = format!("{technique}: triangles that a visibility sample's reference tells apart");
+            return Err(TechniqueError::TooLarge { what, found: capacity.into(), limit: most.into() });
+        }
+        let records = graph.buffer(&format!("{technique}/triangle buffer"), bytes);
+        let count = graph.buffer(&format!("{technique}/triangle count"), 8);
+        let count = graph.clear_buffer(&format!("{technique}/clear count"), count, 0);
+        Ok(Self { records, count, capacity })
+    }
+
+    /// Binds it to the pass that appends.
+    pub fn written_by(self, pass: &mut RasterPass<'_>) -> Self {
+        let records = pass.write("TriangleBuffer", self.records);
+        let count = pass.write("TriangleCount", self.count);
+        Self { records, count, ..self }
+    }
+
+    /// Declares the pass that overwrites each listed ID by its triangle's record, sized on the device, and returns the
+    /// records.
+    ///
+    /// # Errors
+    /// A shader that is not compiled in.
+    pub fn derivatives(
+        self,
+        graph: &mut Graph,
+        frame: &Frame<'_>,
+        technique: &str,
+    ) -> Result<BufferHandle, TechniqueError> {
+        let groups = graph.buffer(&format!("{technique}/dispatch groups"), 12);
+        let shader = frame.shader("triangle_buffer/size.comp")?;
+        let mut pass = frame.compute(graph, &format!("{technique}/size"), &shader);
+        pass.constant("TRIANGLE_CAPACITY", self.capacity);
+        pass.read("TriangleCount", &self.count);
+        let groups = pass.write("DispatchGroups", groups);
+        pass.dispatch([1, 1, 1]);
+        pass.finish();
+
+        let shader = frame.shader("triangle_buffer/derivatives.comp#list")?;
+        let mut pass = frame.compute(graph, &format!("{technique}/derivatives"), &shader);
+        pass.constant("TRIANGLE_CAPACITY", self.capacity);
+        pass.read("TriangleCount", &self.count);
+        let records = pass.write("TriangleBuffer", self.records);
+        pass.dispatch_indirect(&groups, 0);
+        pass.finish();
+        frame.watch_with(graph, "triangles", &self.count, self.capacity, false, capacity::UNSTEADY);
+        Ok(records)
+    }
+}
+
+/// Triangles that there should be room for, and their bytes.
+fn room(frame: &Frame<'_>, technique: &str) -> Result<(u32, u64), TechniqueError> {
+    let capacity = frame.capacity("triangles", FIRST_GUESS);
+    let bytes = record_bytes(frame) * u64::from(capacity);
+    let limit = frame.features().max_storage_buffer_range;
+    if bytes > limit {
+        let what = format!("{technique}: bytes of the triangle buffer for {capacity} triangles");
+        return Err(TechniqueError::TooLarge { what, found: bytes, limit });
+    }
+    Ok((capacity, bytes.max(4)))
+}
+
+/// Declares the passes that store every triangle which shows in `visible`.
+///
+/// # Errors
+/// More triangles than one binding holds.
+pub fn fill(
+    graph: &mut Graph,
+    frame: &Frame<'_>,
+    technique: &str,
+    visible: &Visible,
+) -> Result<TriangleBuffer, TechniqueError> {
+    let name = |stage: &str| format!("{technique}/{stage}");
+    let draws = (frame.scene.draw_count() as u32).max(1);
+    let (capacity, bytes) = room(frame, technique)?;
+    let words = u64::from(draws) * WORDS_A_DRAW;
+    let bits = graph.buffer(&name("visible bits"), 4 * words);
+    let before = graph.buffer(&name("visible before"), 4 * words);
+    let of_draw = graph.buffer(&name("visible of draw"), 4 * u64::from(draws));
+    let base = graph.buffer(&name("draw base"), 4 * u64::from(draws));
+    let count = graph.buffer(&name("triangle count"), 8);
+    let records = graph.buffer(&name("triangle buffer"), bytes);
+    let bits = graph.clear_buffer(&name("clear bits"), bits, 0);
+
+    let shader = frame.shader(&format!("triangle_buffer/mark.comp{}", visible.tag('#')))?;
+    let mut pass = frame.compute(graph, &name("mark"), &shader);
+    pass.constant("SAMPLES", visible.samples());
+    visible.bind(&mut pass, false);
+    let bits = pass.write("MarkedBits", bits);
+    pass.dispatch(frame.groups(8));
+    pass.finish();
+
+    let mut pass = frame.compute(graph, &name("count"), &frame.shader("triangle_buffer/count.comp")?);
+    pass.constant("DRAWS", draws);
+    pass.read("VisibleBits", &bits);
+    let before = pass.write("WordCounts", before);
+    let of_draw = pass.write("VisibleOfDraw", of_draw);
+    pass.dispatch([draws.div_ceil(64), 1, 1]);
+    pass.finish();
+
+    let mut pass = frame.compute(graph, &name("scan"), &frame.shader("triangle_buffer/scan.comp")?);
+    pass.constant("DRAWS", draws).constant("TRIANGLE_CAPACITY", capacity);
+    pass.read("VisibleOfDraw", &of_draw);
+    let base = pass.write("DrawBaseOut", base);
+    let count = pass.write("TriangleCount", count);
+    pass.dispatch([1, 1, 1]);
+    pass.finish();
+
+    let by_keys = matches!(visible, Visible::Keys { .. });
+    let shader =
+        if by_keys { "triangle_buffer/derivatives.comp#keys" } else { "triangle_buffer/derivatives.comp" };
+    let mut pass = frame.compute(graph, &name("derivatives"), &frame.shader(shader)?);
+    pass.constant("TRIANGLE_CAPACITY", capacity);
+    pass.read("VisibleBits", &bits).read("VisibleBefore", &before).read("DrawBase", &base);
+    if by_keys {
+        pass.read("DrawCommands", &frame.buffers.commands);
+    }
+    let records = pass.write("TriangleBuffer", records);
+    let most_groups = frame.features().max_workgroup_count[0];
+    for first in (0..draws).step_by(most_groups as usize) {
+        pass.push(&[first]);
+        pass.dispatch([(draws - first).min(most_groups), DRAW_TRIANGLES / GROUP_TRIANGLES, 1]);
+    }
+    pass.finish();
+
+    frame.watch(graph, "triangles", &count, capacity, false);
+    Ok(TriangleBuffer { records, bits, before, base })
+}
