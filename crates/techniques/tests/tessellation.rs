@@ -92,6 +92,25 @@ fn techniques_agree_on_displaced_surfaces() {
     }
 }
 
+/// `deferred-dedup` shades each triangle of a pixel once, not each patch: more of them, more evaluations.
+#[test]
+fn triangles_are_told_apart_not_patches() {
+    let gpu = afterlight_testkit::gpu();
+    if !can(&gpu) {
+        return;
+    }
+    let stage = Stage::new(&gpu, "builtin:sphere?segments=12");
+    let dedup = find("deferred-dedup").unwrap();
+    let plain = Settings { samples: 4, view: "invocations".to_owned(), ..stage.settings((160, 90), 0) };
+    let before = stage.image(dedup, &plain);
+    let [coarse, fine] = [64.0, 2.0].map(|px| {
+        let image = stage.image(dedup, &tessellated(&plain, 4, px, 0.0));
+        before.pixels.chunks_exact(4).zip(image.pixels.chunks_exact(4)).filter(|(a, b)| a != b).count()
+    });
+    println!("pixels with other counts: {coarse} where patches stay whole, {fine} at 2 px");
+    assert!(coarse < 100 && fine > 2000, "{coarse} pixels where patches stay whole, {fine} at 2 px");
+}
+
 /// What cannot draw tessellated surfaces says so, and what asks for displacement alone, or too much, is told.
 #[test]
 fn what_cannot_says_so() {
