@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use afterlight_techniques::geometry::{MAX_DISPLACEMENT_M, MAX_TESSELLATE_PX, MIN_TESSELLATE_PX};
 use clap::parser::ValueSource;
 use clap::{ArgMatches, Args, FromArgMatches, Parser, Subcommand, ValueEnum};
 
@@ -248,6 +249,12 @@ pub struct CommonArgs {
     /// Anti-aliasing after shading
     #[arg(long, value_enum, default_value_t = Post::None)]
     pub post: Post,
+    /// Tessellates surfaces to triangles with edges of about PX pixels
+    #[arg(long, value_name = "PX", value_parser = tessellate_px)]
+    pub tessellate: Option<f32>,
+    /// Displaces tessellated surfaces by up to MM millimetres along each axis
+    #[arg(long, value_name = "MM", requires = "tessellate", default_value_t = 0.0, value_parser = displacement_mm)]
+    pub displacement: f32,
     /// Shadows
     #[arg(long, value_enum, default_value_t = Shadows::None)]
     pub shadows: Shadows,
@@ -345,6 +352,22 @@ fn share(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(share) if share > 0.0 && share <= 1.0 => Ok(share),
         _ => Err("expected a number above 0, at most 1".to_owned()),
+    }
+}
+
+fn tessellate_px(text: &str) -> Result<f32, String> {
+    let range = MIN_TESSELLATE_PX..=MAX_TESSELLATE_PX;
+    match text.parse::<f32>() {
+        Ok(px) if range.contains(&px) => Ok(px),
+        _ => Err(format!("expected a number of pixels from {} to {}", range.start(), range.end())),
+    }
+}
+
+fn displacement_mm(text: &str) -> Result<f32, String> {
+    let max_mm = MAX_DISPLACEMENT_M * 1e3;
+    match text.parse::<f32>() {
+        Ok(mm) if (0.0..=max_mm).contains(&mm) => Ok(mm),
+        _ => Err(format!("expected a number of millimetres from 0 to {max_mm}")),
     }
 }
 

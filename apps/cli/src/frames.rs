@@ -145,6 +145,7 @@ fn run_group(
 fn without_figures(chosen: &Chosen, error: &TechniqueError) -> Measured {
     let status = match error {
         TechniqueError::Unavailable { .. }
+        | TechniqueError::Untessellated { .. }
         | TechniqueError::Samples { .. }
         | TechniqueError::TooLarge { .. }
         | TechniqueError::UnknownView { .. }

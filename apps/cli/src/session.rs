@@ -191,6 +191,8 @@ impl Session {
             environment: scene.environment,
             keep_hdr,
             post: common.post.into(),
+            tessellate_px: common.tessellate,
+            displacement_m: common.displacement * 1e-3,
             view: common.view.clone(),
             ..Settings::for_scene(&scene, common.width, common.height)
         };
@@ -240,6 +242,8 @@ impl Session {
             camera: self.camera.clone(),
             reference: reference.to_owned(),
             post: Post::from(common.post).name().to_owned(),
+            tessellate_px: common.tessellate,
+            displacement_mm: common.displacement,
             light_seed: (common.lights > 0).then_some(common.light_seed),
             version: env!("CARGO_PKG_VERSION").to_owned(),
         }

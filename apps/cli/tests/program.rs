@@ -80,6 +80,13 @@ fn bad_usage_is_one_line_and_exit_code_2() {
     refused(&["compare", "--set", "cull"], 2, &["--set", "KEY=VALUE"]);
     refused(&["compare", "--json", "builtin:spheres"], 2, &["--json", "builtin:spheres"]);
     refused(&["compare", "--post", "blur"], 2, &["--post", "blur", "fxaa"]);
+    refused(&["compare", "--tessellate", "0.5"], 2, &["--tessellate", "0.5", "from 1 to 64"]);
+    refused(
+        &["compare", "--tessellate", "8", "--displacement", "200"],
+        2,
+        &["--displacement", "200", "from 0 to 100"],
+    );
+    refused(&["compare", "--displacement", "20"], 2, &["--tessellate"]);
     refused(&["compare", "--shadows", "pcss"], 2, &["--shadows", "pcss"]);
     refused(&["compare", "--indirect", "rsm"], 2, &["--indirect", "rsm"]);
     refused(

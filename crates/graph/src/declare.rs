@@ -331,6 +331,10 @@ pub struct VertexLayout {
 pub struct RasterState {
     /// Vertex shader.
     pub vertex: Shader,
+    /// Tessellation control and evaluation shaders: three vertices of the triangle list are a patch.
+    pub tessellation: Option<(Shader, Shader)>,
+    /// Geometry shader.
+    pub geometry: Option<Shader>,
     /// Fragment shader; `None` for depth or stencil alone.
     pub fragment: Option<Shader>,
     /// Specialization constants by name, as bits; each goes to every stage that has it.
@@ -358,6 +362,8 @@ impl RasterState {
     pub fn new(vertex: &Shader, fragment: Option<&Shader>) -> Self {
         Self {
             vertex: vertex.clone(),
+            tessellation: None,
+            geometry: None,
             fragment: fragment.cloned(),
             constants: Vec::new(),
             topology: vk::PrimitiveTopology::TRIANGLE_LIST,
@@ -369,6 +375,27 @@ impl RasterState {
             front_face: vk::FrontFace::COUNTER_CLOCKWISE,
             layout: VertexLayout::default(),
         }
+    }
+
+    /// Sets tessellation control and evaluation shaders.
+    pub fn tessellation(mut self, control: &Shader, evaluation: &Shader) -> Self {
+        self.tessellation = Some((control.clone(), evaluation.clone()));
+        self
+    }
+
+    /// Sets the geometry shader.
+    pub fn geometry(mut self, geometry: &Shader) -> Self {
+        self.geometry = Some(geometry.clone());
+        self
+    }
+
+    /// The shaders, in the order of their stages.
+    pub(crate) fn shaders(&self) -> Vec<&Shader> {
+        let (control, evaluation) = self.tessellation.as_ref().map(|(c, e)| (c, e)).unzip();
+        [Some(&self.vertex), control, evaluation, self.geometry.as_ref(), self.fragment.as_ref()]
+            .into_iter()
+            .flatten()
+            .collect()
     }
 
     /// Sets a specialization constant by name: a `u32`, `i32`, `f32` or `bool`.

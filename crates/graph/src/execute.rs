@@ -8,7 +8,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 use afterlight_gpu::{self as gpu, Device, GpuError, vk};
-use afterlight_shader::{BindingKind, Shader};
+use afterlight_shader::{BindingKind, Shader, Stage};
 
 use crate::bind::{self, BoundSlot, TEXTURE_SET};
 use crate::declare::{
@@ -744,13 +744,15 @@ impl Builder<'_> {
         state: &RasterState,
         bindings: &[BoundSlot],
     ) -> Result<gpu::Pipeline, GraphError> {
-        let shaders = shaders_of(state);
-        let vertex_constants = constants_of(&state.vertex, &state.constants);
-        let fragment_constants = state
-            .fragment
-            .as_ref()
-            .map(|fragment| constants_of(fragment, &state.constants))
-            .unwrap_or_default();
+        let shaders = state.shaders();
+        // In the order of `shaders`: each stage takes the constants that it has.
+        let constants: Vec<_> = shaders.iter().map(|shader| constants_of(shader, &state.constants)).collect();
+        let stage_code = |stage: Stage| {
+            let (shader, constants) =
+                shaders.iter().zip(&constants).find(|(shader, _)| shader.stage == stage)?;
+            Some(code(shader, constants))
+        };
+        let patches = stage_code(Stage::TessControl).zip(stage_code(Stage::TessEvaluation));
         let formats: Vec<vk::Format> =
             node.colors.iter().map(|color| self.image(color.resource).format()).collect();
         let blend: Vec<gpu::BlendState> = match state.blend.is_empty() {
@@ -783,17 +785,17 @@ impl Builder<'_> {
             })
             .collect();
         Ok(self.device.raster_pipeline(&gpu::RasterPipelineDesc {
-            vertex: code(&state.vertex, &vertex_constants),
-            tessellation: None,
-            patch_control_points: 0,
-            geometry: None,
-            fragment: state.fragment.as_ref().map(|fragment| code(fragment, &fragment_constants)),
+            vertex: code(&state.vertex, &constants[0]),
+            tessellation: patches.map(|(control, evaluation)| [control, evaluation]),
+            patch_control_points: if patches.is_some() { 3 } else { 0 },
+            geometry: stage_code(Stage::Geometry),
+            fragment: stage_code(Stage::Fragment),
             slots: &slot_layouts(bindings),
             long_lived: texture_set(pass, &shaders).map(gpu::DescriptorSet::slots),
             push_constant_bytes: bind::push_bytes(&shaders),
             vertex_bindings: &vertex_bindings,
             vertex_attributes: &vertex_attributes,
-            topology: state.topology,
+            topology: if patches.is_some() { vk::PrimitiveTopology::PATCH_LIST } else { state.topology },
             polygon_mode: vk::PolygonMode::FILL,
             depth: (state.depth != DepthTest::OFF)
                 .then_some(gpu::DepthState { compare: state.depth.compare, write: state.depth.write }),
@@ -1063,7 +1065,7 @@ impl Builder<'_> {
         let bound: Vec<Bindings> = pipelines
             .iter()
             .map(|(job, pipeline)| {
-                let shaders = shaders_of(&draw_list[job.draw].state);
+                let shaders = draw_list[job.draw].state.shaders();
                 self.bindings(pass, pipeline.clone(), &pass.bindings[job.draw], &shaders)
             })
             .collect::<Result<_, _>>()?;
@@ -1093,7 +1095,7 @@ impl Builder<'_> {
     }
 
     fn draw(&self, draw: &DrawNode, pipeline: usize, all: Rect, extent: [u32; 2]) -> DrawCommand {
-        let declared = bind::push_bytes(&shaders_of(&draw.state)) as usize;
+        let declared = bind::push_bytes(&draw.state.shaders()) as usize;
         let call = match draw.call {
             CallNode::Direct { vertices, instances, first_vertex, first_instance } => {
                 BoundCall::Direct { vertices, instances, first_vertex, first_instance }
@@ -1139,23 +1141,16 @@ fn draws(node: &RasterNode) -> impl Iterator<Item = &DrawNode> {
     })
 }
 
-fn shaders_of(state: &RasterState) -> Vec<&Shader> {
-    [Some(&state.vertex), state.fragment.as_ref()].into_iter().flatten().collect()
-}
-
 fn same_shader(a: &Shader, b: &Shader) -> bool {
     a.name == b.name && a.spirv.len() == b.spirv.len() && std::ptr::eq(a.spirv.as_ptr(), b.spirv.as_ptr())
 }
 
 /// Whether two states make the same pipeline; cull mode and front face are set with the draw.
 fn same_pipeline(a: &RasterState, b: &RasterState) -> bool {
-    let fragments = match (&a.fragment, &b.fragment) {
-        (None, None) => true,
-        (Some(a), Some(b)) => same_shader(a, b),
-        _ => false,
-    };
-    fragments
-        && same_shader(&a.vertex, &b.vertex)
+    // A shader knows its stage, so that lists of one length that agree hold the same stages.
+    let (of_a, of_b) = (a.shaders(), b.shaders());
+    of_a.len() == of_b.len()
+        && of_a.iter().zip(of_b).all(|(a, b)| same_shader(a, b))
         && a.constants == b.constants
         && a.topology == b.topology
         && a.depth == b.depth

@@ -237,9 +237,7 @@ fn pipelines_of(pass: &PassNode) -> Vec<Vec<&Shader>> {
             .commands
             .iter()
             .filter_map(|command| match command {
-                RasterCommand::Draw(draw) => Some(
-                    [Some(&draw.state.vertex), draw.state.fragment.as_ref()].into_iter().flatten().collect(),
-                ),
+                RasterCommand::Draw(draw) => Some(draw.state.shaders()),
                 RasterCommand::ClearStencil { .. } => None,
             })
             .collect(),
@@ -685,6 +683,20 @@ impl<'a> Resolver<'a> {
         let state = &draw.state;
         let pass = &self.pass.name;
         bind::check_stage(pass, &state.vertex, Stage::Vertex, "Vertex")?;
+        if let Some((control, evaluation)) = &state.tessellation {
+            bind::check_stage(pass, control, Stage::TessControl, "TessControl")?;
+            bind::check_stage(pass, evaluation, Stage::TessEvaluation, "TessEvaluation")?;
+            if state.topology != vk::PrimitiveTopology::TRIANGLE_LIST {
+                return Err(self.attachment_error(
+                    "topology of a draw with tessellation",
+                    format!("{:?}", state.topology),
+                    "TRIANGLE_LIST, a patch a triangle".to_owned(),
+                ));
+            }
+        }
+        if let Some(geometry) = &state.geometry {
+            bind::check_stage(pass, geometry, Stage::Geometry, "Geometry")?;
+        }
         if let Some(fragment) = &state.fragment {
             bind::check_stage(pass, fragment, Stage::Fragment, "Fragment")?;
             let beyond =
@@ -750,9 +762,7 @@ impl<'a> Resolver<'a> {
                 "an index buffer".to_owned(),
             ));
         }
-        let shaders: Vec<&Shader> =
-            [Some(&state.vertex), state.fragment.as_ref()].into_iter().flatten().collect();
-        bind::check_constants(pass, &shaders, &state.constants, &draw.push)
+        bind::check_constants(pass, &state.shaders(), &state.constants, &draw.push)
     }
 
     fn compute(&mut self) -> Result<(), GraphError> {

@@ -269,6 +269,49 @@ fn arguments_made_on_the_device_draw_and_dispatch() {
     assert_clean(&device);
 }
 
+/// Tessellation makes 24 triangles of one (1.5 n² for n segments), a geometry shader numbers them and counts in a buffer; constants and push
+/// constants reach the stages that have them.
+#[test]
+fn a_tessellated_triangle_is_counted() {
+    let Some(device) = open() else { return };
+    let features = device.features();
+    if !features.tessellation_shader || !features.geometry_shader || !features.vertex_stores_and_atomics {
+        println!("skipped: {} has no tessellation or no counting there", device.info().name);
+        return;
+    }
+    let mut g = Graph::new();
+    let count = g.buffer("count", 4);
+    let count = g.clear_buffer("clear", count, 0);
+    let color = g.image("color", ImageInfo::new(COLOR, WIDTH, HEIGHT));
+    let mut pass = g.raster("patches");
+    let count = pass.write("Count", count);
+    let color = pass.color(color, Load::Clear([1.0; 4]));
+    let state = RasterState::new(&shader("patch.vert"), Some(&shader("primitive.frag")))
+        .tessellation(&shader("patch.tesc"), &shader("patch.tese"))
+        .geometry(&shader("count.geom"))
+        .constant("SEGMENTS", 4u32)
+        .constant("STEP", 3u32);
+    pass.draw(covering(0.5, state));
+    g.keep(&count);
+    g.keep(&color);
+    let plan = g.plan(&device).expect("a valid frame");
+    let mut executor = Executor::new(&device, plan).expect("an executor");
+    for _ in 0..2 {
+        let report = executor.run().expect("a run");
+        let bytes = executor.read_buffer("count").expect("kept");
+        assert_eq!(bytes, (24u32 * 3).to_ne_bytes());
+        let statistics = report.pass("patches").and_then(|pass| pass.statistics).expect("statistics");
+        assert_eq!(statistics.clipping_invocations, 24);
+        // A quarter of the covering triangle's area is the image: some of its parts, every one with a multiple of 3.
+        let pixels = executor.read_image("color").expect("kept");
+        let mut ids: Vec<u8> = pixels.chunks_exact(4).map(|texel| texel[0]).collect();
+        ids.sort_unstable();
+        ids.dedup();
+        assert!(ids.len() > 4 && ids.iter().all(|id| id % 3 == 0 && *id < 72), "{ids:?}");
+    }
+    assert_clean(&device);
+}
+
 #[test]
 fn four_samples_are_resolved() {
     let Some(device) = open() else { return };

@@ -93,6 +93,12 @@ pub struct SettingsRecord {
     /// Anti-aliasing after shading: `none`, `fxaa`, `smaa` or `sraa`.
     #[serde(default = "no_post")]
     pub post: String,
+    /// Length on screen of the edges that surfaces were tessellated to, pixels; none without tessellation.
+    #[serde(default)]
+    pub tessellate_px: Option<f32>,
+    /// How far tessellated surfaces were displaced along each axis at most, mm.
+    #[serde(default)]
+    pub displacement_mm: f32,
     /// Seed of the lights; none where the scene's own lights shade.
     pub light_seed: Option<u64>,
     /// Version of the program.
@@ -262,6 +268,8 @@ mod tests {
                 camera: "0".into(),
                 reference: "forward".into(),
                 post: "smaa".into(),
+                tessellate_px: None,
+                displacement_mm: 0.0,
                 light_seed: Some(1),
                 version: "0".into(),
             },

@@ -34,6 +34,8 @@ fn run() -> Run {
             camera: "front".into(),
             reference: "forward".into(),
             post: "smaa".into(),
+            tessellate_px: None,
+            displacement_mm: 0.0,
             light_seed: Some(1),
             version: "0.1.0".into(),
         },

@@ -75,19 +75,24 @@ impl DrawList {
         })
     }
 
-    /// Chooses and orders the draws for a view and writes the commands.
+    /// Chooses and orders the draws for a view and writes the commands; surfaces may be displaced by `displacement_m` along
+    /// each axis.
     pub fn update(
         &mut self,
         scene: &SceneGpu,
         clip_from_world: Mat4,
         eye_ws: Vec3,
+        displacement_m: f32,
     ) -> Result<(), gpu::GpuError> {
         let frustum = Frustum::new(clip_from_world);
         let mut counts = [0u32; BUCKETS];
         for (bucket, visible) in self.visible.iter_mut().enumerate() {
             let (first, end) = (scene.bucket_first[bucket], scene.bucket_first[bucket + 1]);
             let in_view = |draw: &u32| {
-                !self.options.cull || frustum.touches(&scene.draw_infos[*draw as usize].bounds_ws)
+                let bounds = &scene.draw_infos[*draw as usize].bounds_ws;
+                let margin = Vec3::splat(displacement_m);
+                let reached = Aabb { min: bounds.min - margin, max: bounds.max + margin };
+                !self.options.cull || frustum.touches(&reached)
             };
             let mut keyed: Vec<(f32, u32)> = (first..end)
                 .filter(in_view)

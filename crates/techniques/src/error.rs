@@ -81,6 +81,12 @@ pub enum TechniqueError {
         /// What would do.
         expected: String,
     },
+    /// Tessellated surfaces, which the technique does not draw.
+    #[error("{technique}: found --tessellate, expected a technique that can (`techniques --json` tells)")]
+    Untessellated {
+        /// The technique.
+        technique: &'static str,
+    },
     /// The device lacks features.
     #[error("{technique}: the device lacks {missing}")]
     Unavailable {

@@ -27,6 +27,10 @@ pub struct Frame<'a> {
     pub lights: &'a LightList,
     /// What to show: [`crate::view::FINAL`] or one of the technique's views.
     pub view: &'a str,
+    /// Length on screen of the edges that surfaces are tessellated to, pixels; `None` is no tessellation.
+    pub tessellate_px: Option<f32>,
+    /// How far displacement moves a tessellated surface along each axis at most, m.
+    pub displacement_m: f32,
     /// World to clip. A technique that uses it while recording is recorded again when the camera moves.
     pub clip_from_world: glam::Mat4,
     /// Radiance of pixels without a surface.

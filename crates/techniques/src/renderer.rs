@@ -15,6 +15,7 @@ use crate::{
     draw_list::{DrawList, DrawOptions, DrawOrder},
     error::TechniqueError,
     frame::{Frame, FrameBuffers},
+    geometry::{MAX_DISPLACEMENT_M, MIN_TESSELLATE_PX},
     light_list::LightList,
     params::Params,
     post::{self, Post},
@@ -50,6 +51,10 @@ pub struct Settings {
     pub keep_hdr: bool,
     /// Anti-aliasing after shading.
     pub post: Post,
+    /// Tessellates surfaces to edges of that length on screen, pixels.
+    pub tessellate_px: Option<f32>,
+    /// How far tessellated surfaces are displaced along each axis at most, m; nothing without tessellation.
+    pub displacement_m: f32,
 }
 
 impl Settings {
@@ -66,6 +71,8 @@ impl Settings {
             view: view::FINAL.to_owned(),
             keep_hdr: false,
             post: Post::None,
+            tessellate_px: None,
+            displacement_m: 0.0,
         }
     }
 }
@@ -162,6 +169,7 @@ impl Renderer {
     ) -> Result<Prepared, TechniqueError> {
         let info = technique.info();
         self.check(technique)?;
+        self.check_tessellation(technique)?;
         let options = DrawOptions {
             cull: params.text(info, "cull") == "frustum",
             order: match params.text(info, "order") {
@@ -173,7 +181,7 @@ impl Renderer {
         let settings = &self.settings;
         let view = View::new(settings);
         let mut draws = DrawList::new(&self.device, &self.scene, options)?;
-        draws.update(&self.scene, view.clip_from_world, view.eye_ws)?;
+        draws.update(&self.scene, view.clip_from_world, view.eye_ws, settings.displacement_m)?;
         let constants = self.device.create_buffer(&gpu::BufferDesc {
             name: "frame constants",
             bytes: size_of::<FrameConstants>() as u64,
@@ -232,6 +240,37 @@ impl Renderer {
         Ok(())
     }
 
+    /// Checks what is asked of tessellation.
+    fn check_tessellation(&self, technique: &dyn Technique) -> Result<(), TechniqueError> {
+        let info = technique.info();
+        let Settings { tessellate_px, displacement_m, .. } = self.settings;
+        let conflict = |found: String, expected: String| {
+            Err(TechniqueError::Conflict { technique: info.id, found, expected })
+        };
+        if !(0.0..=MAX_DISPLACEMENT_M).contains(&displacement_m) {
+            let expected = format!("from 0 to {MAX_DISPLACEMENT_M} m");
+            return conflict(format!("a displacement of {displacement_m} m"), expected);
+        }
+        let Some(px) = tessellate_px else {
+            return match displacement_m > 0.0 {
+                true => conflict("displacement alone".to_owned(), "tessellation with it".to_owned()),
+                false => Ok(()),
+            };
+        };
+        if !info.tessellation {
+            return Err(TechniqueError::Untessellated { technique: info.id });
+        }
+        if !px.is_finite() || px < MIN_TESSELLATE_PX {
+            let expected = format!("at least {MIN_TESSELLATE_PX}");
+            return conflict(format!("tessellation to edges of {px} pixels"), expected);
+        }
+        if !self.device.features().tessellation_shader {
+            let missing = "tessellation shaders".to_owned();
+            return Err(TechniqueError::Unavailable { technique: info.id, missing });
+        }
+        Ok(())
+    }
+
     /// Records a frame with capacities for what can overflow.
     #[expect(clippy::too_many_arguments, reason = "the parts of one frame")]
     fn record(
@@ -256,6 +295,8 @@ impl Renderer {
             clip_from_world: view.clip_from_world,
             background_radiance: settings.environment.background_radiance.into(),
             view: &settings.view,
+            tessellate_px: settings.tessellate_px,
+            displacement_m: settings.displacement_m,
             buffers: self.import(&mut graph, constants, draws),
             extra_shaders: &self.extra_shaders,
             device: &self.device,

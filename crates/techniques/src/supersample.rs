@@ -40,6 +40,8 @@ pub fn reference_rgba8(
         keep_hdr: true,
         post: Post::None,
         view: view::FINAL.to_owned(),
+        // The same triangles: edges of the large image are as much longer.
+        tessellate_px: settings.tessellate_px.map(|px| px * factor as f32),
         ..settings.clone()
     };
     let renderer = Renderer::with_scene(device, Arc::clone(scene), &large)?;

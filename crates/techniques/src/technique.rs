@@ -100,6 +100,8 @@ pub struct Info {
     pub needs: &'static [Need],
     /// Sample counts that it can render where the device has them.
     pub samples: &'static [u32],
+    /// Whether it draws tessellated surfaces: everything that finds triangles again by the index buffer does not.
+    pub tessellation: bool,
     /// Debug views that it has besides `final`, by name.
     pub views: &'static [&'static str],
 }

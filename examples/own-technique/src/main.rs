@@ -40,6 +40,7 @@ static INFO: Info = Info {
     params: &[LEVELS],
     needs: &[],
     samples: &[1],
+    tessellation: false,
 };
 
 impl Technique for Toon {

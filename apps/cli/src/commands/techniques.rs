@@ -32,6 +32,7 @@ fn technique_json(info: &Info) -> Value {
         "params": Params::known(info).collect::<Vec<_>>(),
         "needs": info.needs.iter().map(|need| need.name).collect::<Vec<_>>(),
         "samples": info.samples,
+        "tessellation": info.tessellation,
     })
 }
 

@@ -119,6 +119,40 @@ fn a_wrong_stage() {
     names_all(&message(g), &["pass p", "cull", "Fragment", "Compute"]);
 }
 
+/// A raster pass `p` with one colour and a draw, which does not plan.
+fn draw_message(state: RasterState) -> String {
+    let mut g = Graph::new();
+    let image = g.image("a", ImageInfo::new(COLOR, 4, 4));
+    let mut pass = g.raster("p");
+    let _ = pass.color(image, Load::DontCare);
+    pass.draw(Draw::new(state, DrawCall::vertices(3)));
+    message(g)
+}
+
+#[test]
+fn stages_between_vertices_and_fragments_that_do_not_fit() {
+    let vertex = shader("v", Stage::Vertex, &[]);
+    let control = shader("control", Stage::TessControl, &[]);
+    let evaluation = shader("evaluation", Stage::TessEvaluation, &[]);
+    let state = RasterState::new(&vertex, None);
+
+    let swapped = state.clone().tessellation(&evaluation, &control);
+    names_all(&draw_message(swapped), &["pass p", "evaluation", "TessEvaluation", "TessControl"]);
+    let twice = state.clone().tessellation(&control, &control);
+    names_all(&draw_message(twice), &["pass p", "control", "TessControl", "TessEvaluation"]);
+    let strip = state.clone().tessellation(&control, &evaluation);
+    let strip = strip.topology(vk::PrimitiveTopology::TRIANGLE_STRIP);
+    names_all(&draw_message(strip), &["pass p", "topology", "TRIANGLE_STRIP", "TRIANGLE_LIST"]);
+    names_all(&draw_message(state.clone().geometry(&vertex)), &["pass p", "v", "Vertex", "Geometry"]);
+
+    // Slots and constants of these stages are checked as those of the others are.
+    let reads = shader("reads", Stage::Geometry, &[Slot("list", BindingKind::StorageBuffer, "r")]);
+    names_all(&draw_message(state.clone().geometry(&reads)), &["pass p", "reads", "\"list\""]);
+    let control = with_constant(control, "PX");
+    let unknown = state.tessellation(&control, &evaluation).constant("PY", 1u32);
+    names_all(&draw_message(unknown), &["pass p", "\"PY\"", "PX"]);
+}
+
 #[test]
 fn a_read_before_any_write() {
     let mut g = Graph::new();

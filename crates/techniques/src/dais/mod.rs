@@ -104,6 +104,7 @@ static INFO: Info = Info {
     params: &[multisample::LIGHTS, FILL, CACHE_BUCKETS, compute_raster::VISIBILITY, compute_raster::SMALL],
     needs: &[],
     samples: ANY_SAMPLES,
+    tessellation: false,
     views: multisample::VIEWS,
 };
 

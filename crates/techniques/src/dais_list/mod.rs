@@ -57,6 +57,7 @@ static INFO: Info = Info {
     params: &[multisample::LIGHTS, NODES, dais::CACHE_BUCKETS],
     needs: &[Need { name: "post-depth coverage", test: |features| features.post_depth_coverage }],
     samples: MULTIPLE_SAMPLES,
+    tessellation: false,
     views: multisample::VIEWS,
 };
 

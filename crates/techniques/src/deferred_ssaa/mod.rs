@@ -43,6 +43,7 @@ static INFO: Info = Info {
     params: &[multisample::LIGHTS],
     needs: &[multisample::STANDARD_LOCATIONS],
     samples: MULTIPLE_SAMPLES,
+    tessellation: true,
     views: multisample::VIEWS,
 };
 

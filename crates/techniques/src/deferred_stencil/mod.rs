@@ -43,6 +43,7 @@ static INFO: Info = Info {
     params: &[],
     needs: &[],
     samples: &[1],
+    tessellation: true,
     views: &[],
 };
 

@@ -43,6 +43,7 @@ static INFO: Info = Info {
     params: &[],
     needs: &[],
     samples: ANY_SAMPLES,
+    tessellation: true,
     views: &["invocations"],
 };
 

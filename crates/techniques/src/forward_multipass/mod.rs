@@ -51,6 +51,7 @@ static INFO: Info = Info {
     params: &[SCISSOR],
     needs: &[],
     samples: &[1],
+    tessellation: true,
     views: &[],
 };
 

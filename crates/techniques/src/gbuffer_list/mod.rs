@@ -90,6 +90,7 @@ static INFO: Info = Info {
     ],
     needs: &[multisample::STANDARD_LOCATIONS],
     samples: ANY_SAMPLES,
+    tessellation: false,
     views: multisample::VIEWS,
 };
 

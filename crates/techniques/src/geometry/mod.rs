@@ -17,12 +17,43 @@ use crate::{
     scene_gpu::{BUCKETS, Bucket},
 };
 
+/// Shortest edge that tessellation aims at, pixels.
+pub const MIN_TESSELLATE_PX: f32 = 1.0;
+/// Longest edge that tessellation aims at, pixels.
+pub const MAX_TESSELLATE_PX: f32 = 64.0;
+/// Farthest displacement along each axis, m: beyond an eighth of the field's period the surface would fold.
+pub const MAX_DISPLACEMENT_M: f32 = 0.1;
+
 /// Shaders of one kind of surface.
 pub struct SurfaceShaders {
     /// Vertex shader, a variant of `geometry/surface.vert`.
     pub vertex: Shader,
+    /// Tessellation control and evaluation shaders, where the frame is tessellated.
+    pub tessellation: Option<(Shader, Shader)>,
+    /// Geometry shader.
+    pub geometry: Option<Shader>,
     /// Fragment shader; `None` writes depth alone.
     pub fragment: Option<Shader>,
+}
+
+impl SurfaceShaders {
+    /// Shaders by name; where the frame is tessellated, the vertex shader's part is done by the stages of tessellation.
+    ///
+    /// # Errors
+    /// A name that is not compiled in: of a vertex shader that tessellation has no twin of, the twin's.
+    pub fn new(frame: &Frame<'_>, vertex: &str, fragment: Option<&str>) -> Result<Self, TechniqueError> {
+        let fragment = fragment.map(|name| frame.shader(name)).transpose()?;
+        if frame.tessellate_px.is_none() {
+            return Ok(Self { vertex: frame.shader(vertex)?, tessellation: None, geometry: None, fragment });
+        }
+        let evaluation = frame.shader(&vertex.replacen(".vert", ".tese", 1))?;
+        Ok(Self {
+            vertex: frame.shader("geometry/surface.vert#tessellation")?,
+            tessellation: Some((frame.shader("geometry/surface.tesc")?, evaluation)),
+            geometry: None,
+            fragment,
+        })
+    }
 }
 
 /// How the scene is drawn in a pass.
@@ -80,14 +111,8 @@ impl Surfaces {
         masked: (&str, &str),
     ) -> Result<Self, TechniqueError> {
         Ok(Self {
-            opaque: SurfaceShaders {
-                vertex: frame.shader(opaque.0)?,
-                fragment: opaque.1.map(|name| frame.shader(name)).transpose()?,
-            },
-            masked: SurfaceShaders {
-                vertex: frame.shader(masked.0)?,
-                fragment: Some(frame.shader(masked.1)?),
-            },
+            opaque: SurfaceShaders::new(frame, opaque.0, opaque.1)?,
+            masked: SurfaceShaders::new(frame, masked.0, Some(masked.1))?,
             depth: DepthTest::NEAREST,
             stencil: None,
             masked_stencil: None,
@@ -97,6 +122,26 @@ impl Surfaces {
             push: Vec::new(),
             scissor: None,
         })
+    }
+
+    /// Numbers the triangles that tessellation makes in `gl_PrimitiveID`, the full vertex path alone; the counter, zero before
+    /// the pass, is to be bound as `TriangleCount`.
+    ///
+    /// # Errors
+    /// A device that counts in no geometry shader.
+    pub fn numbered(mut self, frame: &Frame<'_>, technique: &'static str) -> Result<Self, TechniqueError> {
+        let features = frame.features();
+        let missing = [
+            (features.geometry_shader, "geometry shaders"),
+            (features.vertex_stores_and_atomics, "atomics in geometry shaders"),
+        ];
+        if let Some((_, missing)) = missing.iter().find(|(there, _)| !there) {
+            return Err(TechniqueError::Unavailable { technique, missing: (*missing).to_owned() });
+        }
+        let shader = frame.shader("geometry/number.geom")?;
+        self.opaque.geometry = Some(shader.clone());
+        self.masked.geometry = Some(shader);
+        Ok(self)
     }
 
     /// With another depth test.
@@ -147,7 +192,12 @@ impl Surfaces {
         let shaders = if bucket.masked() { &self.masked } else { &self.opaque };
         let mut state = RasterState::new(&shaders.vertex, shaders.fragment.as_ref());
         let all: Vec<&Shader> = std::iter::once(&shaders.vertex).chain(&shaders.fragment).collect();
+        state.geometry = shaders.geometry.clone();
         state.constants = frame.constants(&all);
+        if let Some((control, evaluation)) = &shaders.tessellation {
+            state = state.tessellation(control, evaluation);
+            state.constants.extend(tessellation_constants(frame, bucket));
+        }
         state.constants.extend(self.constants.iter().cloned());
         state.depth = self.depth;
         state.stencil = if bucket.masked() { self.masked_stencil.or(self.stencil) } else { self.stencil };
@@ -166,6 +216,20 @@ impl Surfaces {
         draw.scissor = self.scissor;
         draw
     }
+}
+
+/// Specialization constants of `surface.tesc` and `surface.tese` for a bucket.
+fn tessellation_constants(frame: &Frame<'_>, bucket: Bucket) -> [(String, u32); 3] {
+    let facing = match (bucket.double_sided(), bucket.mirrored()) {
+        (true, _) => 0,
+        (false, false) => 1,
+        (false, true) => 2,
+    };
+    [
+        ("TESSELLATE_PX".to_owned(), frame.tessellate_px.unwrap_or(MIN_TESSELLATE_PX).to_bits()),
+        ("DISPLACEMENT_M".to_owned(), frame.displacement_m.to_bits()),
+        ("FACING".to_owned(), facing),
+    ]
 }
 
 /// Positions, attributes, and one `DrawData` an instance.

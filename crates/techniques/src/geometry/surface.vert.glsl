@@ -2,7 +2,8 @@
 //
 // One path for the position in all variants, `invariant`, so that passes with an equal depth test meet the depths of
 // the pass before. Variants: POSITION_ONLY (depth and IDs of opaque surfaces), WITH_UV (the same with coordinates for an
-// alpha test), none (all attributes), CENTROID (and the position once more).
+// alpha test), none (all attributes), CENTROID (and the position once more). TESSELLATION hands world space on to
+// surface.tesc.glsl; whichever of the others runs then is a variant of surface.tese.glsl.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "frame.glsl"
@@ -16,7 +17,9 @@ layout(location = 5) in vec4 object_row1;
 layout(location = 6) in vec4 object_row2;
 layout(location = 7) in uvec4 draw_tail;                  // first index, first vertex, material, flags
 
+#ifndef TESSELLATION
 invariant gl_Position;
+#endif
 
 #ifdef POSITION_ONLY
 layout(location = 0) flat out uvec2 draw_material;
@@ -36,7 +39,9 @@ layout(location = 6) out vec3 centroid_position_ws;     // the same, read with c
 
 void main() {
     vec3 world = position_to_world(object_row0, object_row1, object_row2, position_os);
+#ifndef TESSELLATION
     gl_Position = frame.clip_from_world * vec4(world, 1.0);
+#endif
     draw_material = uvec2(gl_InstanceIndex, draw_tail.z);
 #ifndef POSITION_ONLY
     uv0_uv1 = vec4(uintBitsToFloat(packed_normal_tangent_uv.zw), uintBitsToFloat(packed_uv1_color.xy));

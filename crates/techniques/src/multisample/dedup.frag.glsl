@@ -5,7 +5,7 @@
 // Out, RGBA8 each, since some devices have no multisampled integer formats: 0 base colour (sRGB) and metalness; 1 normal, world
 // space, octahedral, 2 x 12 bits, and roughness (0: takes no light); 2 triangle ID; 3 view distance, m, at the pixel's
 // centre, the upper 24 bits of a positive float (8 exponent, 16 mantissa: 2^-17), and occlusion; with EMISSION 4 radiance,
-// B10G11R11.
+// B10G11R11. With NUMBERED geometry/number.geom has numbered the triangles that tessellation made.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shading.glsl"
@@ -28,7 +28,12 @@ void main() {
     uvec2 normal = uvec2(round((octahedral_encode(s.normal_ws) * 0.5 + 0.5) * 4095.0));
     uint roughness = s.unlit ? 0u : uint(round(clamp(s.roughness, MIN_ROUGHNESS, 1.0) * 255.0));
     normal_roughness = unpackUnorm4x8(normal.x | normal.y << 12 | roughness << 24);
-    triangle_id = unpackUnorm4x8(draw_material.x << TRIANGLE_BITS | uint(gl_PrimitiveID));
+#ifdef NUMBERED
+    uint id = uint(gl_PrimitiveID);
+#else
+    uint id = draw_material.x << TRIANGLE_BITS | uint(gl_PrimitiveID);
+#endif
+    triangle_id = unpackUnorm4x8(id);
     float distance_m = max(dot(frame.distance_from_world, vec4(p.position_ws, 1.0)), 0.0);
     uint distance_bits = min(floatBitsToUint(distance_m) + 64u >> 7, 0xffffffu);
     distance_occlusion = unpackUnorm4x8(distance_bits | uint(round(s.occlusion * 255.0)) << 24);

@@ -8,7 +8,7 @@
 //!
 //! Scenes with emissive surfaces take four bytes more.
 
-use afterlight_graph::{ComputePass, Graph, ImageHandle, Load, RasterPass, gpu::vk};
+use afterlight_graph::{BufferHandle, ComputePass, Graph, ImageHandle, Load, RasterPass, gpu::vk};
 
 use crate::{
     error::TechniqueError,
@@ -81,7 +81,7 @@ pub fn fill_samples(
         // Samples without a surface are no edge.
         ("gbuffer_roughness", vk::Format::R8G8B8A8_UNORM, Load::Clear([0.0; 4])),
     ];
-    fill(graph, frame, technique, &surfaces, &images)
+    fill(graph, frame, technique, &surfaces, &images, None)
 }
 
 /// Declares the pass `technique/gbuffer` that fills 20 bytes a sample, depth included.
@@ -91,20 +91,28 @@ pub fn fill_samples(
 pub fn fill_dedup(
     graph: &mut Graph,
     frame: &Frame<'_>,
-    technique: &str,
+    technique: &'static str,
 ) -> Result<SampleBuffer, TechniqueError> {
-    let surfaces = Surfaces::shaded(
-        frame,
-        &emission_variant(frame, "multisample/dedup.frag"),
-        &emission_variant(frame, "multisample/dedup.frag#mask"),
-    )?;
+    let numbered = frame.tessellate_px.is_some();
+    let [opaque, masked] = match numbered {
+        false => ["multisample/dedup.frag", "multisample/dedup.frag#mask"],
+        true => ["multisample/dedup.frag#numbered", "multisample/dedup.frag#mask-numbered"],
+    };
+    let mut surfaces =
+        Surfaces::shaded(frame, &emission_variant(frame, opaque), &emission_variant(frame, masked))?;
+    let mut count = None;
+    if numbered {
+        surfaces = surfaces.numbered(frame, technique)?;
+        let buffer = graph.buffer(&format!("{technique}/triangle count"), 4);
+        count = Some(graph.clear_buffer(&format!("{technique}/clear triangle count"), buffer, 0));
+    }
     let images = [
         ("gbuffer_base_color", vk::Format::R8G8B8A8_SRGB, Load::DontCare),
         ("gbuffer_normal", vk::Format::R8G8B8A8_UNORM, Load::DontCare),
         ("gbuffer_id", vk::Format::R8G8B8A8_UNORM, Load::Clear(NO_TRIANGLE_RGBA8)),
         ("gbuffer_distance", vk::Format::R8G8B8A8_UNORM, Load::DontCare),
     ];
-    fill(graph, frame, technique, &surfaces, &images)
+    fill(graph, frame, technique, &surfaces, &images, count)
 }
 
 fn fill(
@@ -113,6 +121,7 @@ fn fill(
     technique: &str,
     surfaces: &Surfaces,
     images: &[(&'static str, vk::Format, Load<[f32; 4]>)],
+    triangle_count: Option<BufferHandle>,
 ) -> Result<SampleBuffer, TechniqueError> {
     let mut images = images.to_vec();
     if frame.scene.has_emission {
@@ -127,6 +136,9 @@ fn fill(
 
     let mut pass = graph.raster(&format!("{technique}/gbuffer"));
     frame.bind_scene(&mut pass);
+    if let Some(count) = triangle_count {
+        let _count = pass.write("TriangleCount", count);
+    }
     let images = declared.into_iter().map(|(slot, image, load)| (slot, pass.color(image, load))).collect();
     let depth = pass.depth(depth, Load::Clear(0.0));
     surfaces.draw(frame, &mut pass);

@@ -40,6 +40,7 @@ static INFO: Info = Info {
     params: &[compute_raster::VISIBILITY, compute_raster::SMALL],
     needs: &[],
     samples: &[1],
+    tessellation: false,
     views: &[],
 };
 
