@@ -81,7 +81,8 @@ fn bad_usage_is_one_line_and_exit_code_2() {
     refused(&["compare", "--json", "builtin:spheres"], 2, &["--json", "builtin:spheres"]);
     refused(&["compare", "--post", "blur"], 2, &["--post", "blur", "fxaa"]);
     refused(&["compare", "--shadows", "pcss"], 2, &["--shadows", "pcss"]);
-    refused(&["compare", "--indirect", "rsm"], 2, &["--indirect", "rsm"]);
+    refused(&["compare", "--indirect", "gi"], 2, &["--indirect", "gi", "rsm"]);
+    refused(&["compare", "--shadow-map-size", "256"], 2, &["--shadow-map-size", "256", "--indirect rsm"]);
     refused(
         &["render", "builtin:edge", "--technique", "forward", "--view", "normals", "-o", "unused.png"],
         2,

@@ -91,8 +91,14 @@ pub struct SettingsRecord {
     /// Technique that images are compared to.
     pub reference: String,
     /// Anti-aliasing after shading: `none`, `fxaa`, `smaa` or `sraa`.
-    #[serde(default = "no_post")]
+    #[serde(default = "none")]
     pub post: String,
+    /// Indirect light: `none` or `rsm`.
+    #[serde(default = "none")]
+    pub indirect: String,
+    /// Width and height of a light's view, texels; none where there is none.
+    #[serde(default)]
+    pub shadow_map_size: Option<u32>,
     /// Seed of the lights; none where the scene's own lights shade.
     pub light_seed: Option<u64>,
     /// Version of the program.
@@ -100,7 +106,7 @@ pub struct SettingsRecord {
 }
 
 /// What records from before there was a choice had.
-fn no_post() -> String {
+fn none() -> String {
     "none".to_owned()
 }
 
@@ -262,6 +268,8 @@ mod tests {
                 camera: "0".into(),
                 reference: "forward".into(),
                 post: "smaa".into(),
+                indirect: "none".into(),
+                shadow_map_size: None,
                 light_seed: Some(1),
                 version: "0".into(),
             },

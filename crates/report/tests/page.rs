@@ -34,6 +34,8 @@ fn run() -> Run {
             camera: "front".into(),
             reference: "forward".into(),
             post: "smaa".into(),
+            indirect: "none".into(),
+            shadow_map_size: None,
             light_seed: Some(1),
             version: "0.1.0".into(),
         },
