@@ -160,7 +160,7 @@ impl Frame<'_> {
     }
 
     /// Binds what every pass over the scene may read, by the names of `include/*.glsl`: frame constants, draws, materials,
-    /// lights, vertices, textures. Slots that no shader of the pass has stay unused.
+    /// lights, what indirect light is gathered from, vertices, textures. Slots that no shader of the pass has stay unused.
     pub fn bind_scene(&self, pass: &mut impl Slots) {
         let b = &self.buffers;
         pass.read_buffer("FrameBlock", &b.frame);
