@@ -54,6 +54,7 @@ fn section(section: &Section<'_>) -> Markup {
                 (settings.width) "×" (settings.height) ", "
                 (settings.samples) @if settings.samples == 1 { " sample" } @else { " samples" } " a pixel, "
                 @if settings.post != "none" { (settings.post) ", " }
+                @if settings.indirect != "none" { "indirect light by " (settings.indirect) ", " }
                 "median of " (settings.frames) @if settings.frames == 1 { " frame" } @else { " frames" }
                 "; images compared to " code { (settings.reference) }
             }
