@@ -114,8 +114,13 @@ shader_struct! {
 }
 
 /// Layouts that builds check by default.
-pub const LAYOUTS: &[crate::StructLayout] =
-    &[FrameConstants::LAYOUT, RsmConstants::LAYOUT, DrawData::LAYOUT, MaterialData::LAYOUT, LightData::LAYOUT];
+pub const LAYOUTS: &[crate::StructLayout] = &[
+    FrameConstants::LAYOUT,
+    RsmConstants::LAYOUT,
+    DrawData::LAYOUT,
+    MaterialData::LAYOUT,
+    LightData::LAYOUT,
+];
 
 /// `DrawData::flags`: negative determinant.
 pub const DRAW_MIRRORED: u32 = 1;
