@@ -258,7 +258,7 @@ pub struct CommonArgs {
     /// Shadows
     #[arg(long, value_enum, default_value_t = Shadows::None)]
     pub shadows: Shadows,
-    /// Width and height of a shadow map, texels
+    /// Width and height of a light's view, texels [default: 512]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub shadow_map_size: Option<u32>,
     /// Indirect light
@@ -310,6 +310,15 @@ pub enum Indirect {
     Rsm,
 }
 
+impl From<Indirect> for afterlight_techniques::Indirect {
+    fn from(indirect: Indirect) -> Self {
+        match indirect {
+            Indirect::None => Self::None,
+            Indirect::Rsm => Self::Rsm,
+        }
+    }
+}
+
 impl CommonArgs {
     /// Refuses what this version does not have yet.
     pub fn check(&self) -> Result<(), Failure> {
@@ -327,11 +336,11 @@ impl CommonArgs {
         if self.shadows != Shadows::None {
             return not_yet("--shadows", &name_of(self.shadows), "none");
         }
-        if let Some(size) = self.shadow_map_size {
-            return not_yet("--shadow-map-size", &size.to_string(), "no such option without --shadows");
-        }
-        if self.indirect != Indirect::None {
-            return not_yet("--indirect", &name_of(self.indirect), "none");
+        if let Some(size) = self.shadow_map_size
+            && self.indirect == Indirect::None
+        {
+            let expected = "no such option without --indirect rsm";
+            return Err(Failure::option("--shadow-map-size", size, expected));
         }
         Ok(())
     }
@@ -415,7 +424,7 @@ mod tests {
 
     #[test]
     fn what_is_not_there_yet_is_refused() {
-        for option in [["--shadows", "map"], ["--indirect", "rsm"], ["--shadow-map-size", "512"]] {
+        for option in [["--shadows", "map"], ["--shadows", "pcss"], ["--shadow-map-size", "512"]] {
             let failure = compare(&option).common.check().expect_err("is refused");
             let line = failure.lines().remove(0);
             assert_eq!(failure.code(), 2);
@@ -426,6 +435,7 @@ mod tests {
         }
         let failure = compare(&["--post", "fxaa", "--view", "edges"]).common.check().expect_err("is refused");
         assert!(failure.lines()[0].starts_with("--post: found fxaa, expected none"));
+        assert!(compare(&["--indirect", "rsm", "--shadow-map-size", "256"]).common.check().is_ok());
         assert!(compare(&["--camera", "-1,0,0,0,0,0,60"]).common.check().is_ok());
     }
 }

@@ -8,9 +8,9 @@ use afterlight_graph::gpu::{Device, DeviceOptions};
 use afterlight_measure::{DeviceRecord, SceneRecord, SettingsRecord};
 use afterlight_scene::{Camera, LightKind, LoadOptions, Projection, Scene, camera, lights, load_source};
 use afterlight_techniques::cost::Workload;
-use afterlight_techniques::{Params, Post, Renderer, SceneGpu, Settings, Technique, registry};
+use afterlight_techniques::{Indirect, Params, Post, Renderer, SceneGpu, Settings, Technique, registry};
 
-use crate::args::CommonArgs;
+use crate::args::{self, CommonArgs};
 use crate::failure::Failure;
 use crate::progress::Progress;
 
@@ -194,7 +194,12 @@ impl Session {
             tessellate_px: common.tessellate,
             displacement_m: common.displacement * 1e-3,
             view: common.view.clone(),
+            indirect: common.indirect.into(),
             ..Settings::for_scene(&scene, common.width, common.height)
+        };
+        let settings = Settings {
+            shadow_map_size_px: common.shadow_map_size.unwrap_or(settings.shadow_map_size_px),
+            ..settings
         };
         let bar = progress.bar("textures", scene.images.len() as u64);
         let on_device = SceneGpu::upload(device, &scene, &|done, steps| {
@@ -215,6 +220,7 @@ impl Session {
         drop(scene);
         let camera = settings.camera.name.clone();
         let renderer = Renderer::with_scene(device, Arc::clone(&on_device), &settings)?;
+        warnings.extend(renderer.warnings());
         let info = device.info();
         Ok(Session {
             renderer,
@@ -244,6 +250,9 @@ impl Session {
             post: Post::from(common.post).name().to_owned(),
             tessellate_px: common.tessellate,
             displacement_mm: common.displacement,
+            indirect: Indirect::from(common.indirect).name().to_owned(),
+            shadow_map_size: (common.indirect != args::Indirect::None)
+                .then(|| self.renderer.settings().shadow_map_size_px),
             light_seed: (common.lights > 0).then_some(common.light_seed),
             version: env!("CARGO_PKG_VERSION").to_owned(),
         }

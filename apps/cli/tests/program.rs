@@ -88,7 +88,8 @@ fn bad_usage_is_one_line_and_exit_code_2() {
     );
     refused(&["compare", "--displacement", "20"], 2, &["--tessellate"]);
     refused(&["compare", "--shadows", "pcss"], 2, &["--shadows", "pcss"]);
-    refused(&["compare", "--indirect", "rsm"], 2, &["--indirect", "rsm"]);
+    refused(&["compare", "--indirect", "gi"], 2, &["--indirect", "gi", "rsm"]);
+    refused(&["compare", "--shadow-map-size", "256"], 2, &["--shadow-map-size", "256", "--indirect rsm"]);
     refused(
         &["render", "builtin:edge", "--technique", "forward", "--view", "normals", "-o", "unused.png"],
         2,
@@ -211,6 +212,36 @@ fn render_writes_png_exr_and_figures() {
         serde_json::from_slice(&fs::read(folder.path().join("s.json")).expect("written")).expect("is JSON");
     assert!(stats["process"]["first_image_ms"].as_f64().is_some_and(|ms| ms > 0.0));
     assert_eq!(stats["results"][0]["technique"], "forward");
+}
+
+/// Indirect light is a pass of its own that no technique's memory counts, and the figures say that it was there.
+#[test]
+fn indirect_light_is_recorded() {
+    if !has_device() {
+        return;
+    }
+    let folder = folder();
+    let stats = |more: &[&str]| -> Value {
+        let plain =
+            ["render", "builtin:intersect", "--technique", "deferred", "-o", "a.png", "--stats", "s.json"];
+        let output = run_in(folder.path(), &[&plain[..], &SMALL, more].concat());
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        let bytes = fs::read(folder.path().join("s.json")).expect("written");
+        serde_json::from_slice(&bytes).expect("is JSON")
+    };
+    let without = stats(&[]);
+    let with = stats(&["--indirect", "rsm", "--shadow-map-size", "64"]);
+    assert_eq!(
+        (&without["settings"]["indirect"], &with["settings"]["indirect"]),
+        (&"none".into(), &"rsm".into())
+    );
+    assert!(without["settings"]["shadow_map_size"].is_null());
+    assert_eq!(with["settings"]["shadow_map_size"], 64);
+    let memory = |run: &Value| run["results"][0]["memory"]["technique_bytes"].clone();
+    assert_eq!(memory(&without), memory(&with));
+    let passes = |run: &Value| run["results"][0]["passes"].as_array().map_or(0, Vec::len);
+    assert_eq!(passes(&without) + 1, passes(&with));
+    assert_eq!(with["results"][0]["passes"][0]["name"], "shared/rsm");
 }
 
 #[test]

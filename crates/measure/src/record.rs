@@ -91,7 +91,7 @@ pub struct SettingsRecord {
     /// Technique that images are compared to.
     pub reference: String,
     /// Anti-aliasing after shading: `none`, `fxaa`, `smaa` or `sraa`.
-    #[serde(default = "no_post")]
+    #[serde(default = "none")]
     pub post: String,
     /// Length on screen of the edges that surfaces were tessellated to, pixels; none without tessellation.
     #[serde(default)]
@@ -99,6 +99,12 @@ pub struct SettingsRecord {
     /// How far tessellated surfaces were displaced along each axis at most, mm.
     #[serde(default)]
     pub displacement_mm: f32,
+    /// Indirect light: `none` or `rsm`.
+    #[serde(default = "none")]
+    pub indirect: String,
+    /// Width and height of a light's view, texels; none where there is none.
+    #[serde(default)]
+    pub shadow_map_size: Option<u32>,
     /// Seed of the lights; none where the scene's own lights shade.
     pub light_seed: Option<u64>,
     /// Version of the program.
@@ -106,7 +112,7 @@ pub struct SettingsRecord {
 }
 
 /// What records from before there was a choice had.
-fn no_post() -> String {
+fn none() -> String {
     "none".to_owned()
 }
 
@@ -270,6 +276,8 @@ mod tests {
                 post: "smaa".into(),
                 tessellate_px: None,
                 displacement_mm: 0.0,
+                indirect: "none".into(),
+                shadow_map_size: None,
                 light_seed: Some(1),
                 version: "0".into(),
             },

@@ -7,6 +7,7 @@ pub mod brdf;
 pub mod furnace;
 pub mod packing;
 pub mod raster;
+pub mod rsm;
 pub mod texture;
 pub mod tiles;
 pub mod tonemap;

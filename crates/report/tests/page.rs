@@ -36,6 +36,8 @@ fn run() -> Run {
             post: "smaa".into(),
             tessellate_px: None,
             displacement_mm: 0.0,
+            indirect: "none".into(),
+            shadow_map_size: None,
             light_seed: Some(1),
             version: "0.1.0".into(),
         },

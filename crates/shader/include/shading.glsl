@@ -1,11 +1,12 @@
 // The illumination model, once for every technique: glTF 2.0's metal-rough BRDF (appendix B of its specification) under
-// point, spot and directional lights (KHR_lights_punctual), a constant ambient term, emission.
+// point, spot and directional lights (KHR_lights_punctual), a constant ambient term, emission, indirect light.
 //
 // CPU twin: crates/oracle/src/brdf.rs.
 #ifndef AFTERLIGHT_SHADING
 #define AFTERLIGHT_SHADING
 #include "frame.glsl"
 #include "material.glsl"
+#include "indirect.glsl"
 
 // A light is four texels of an RGBA32UI image, 256 lights a row. An image and not a buffer, since a texel comes with one
 // vector load where lavapipe reads a buffer word by word and lane by lane.
@@ -117,10 +118,14 @@ vec3 all_lights_radiance(ShadingPoint p) {
     return radiance;
 }
 
-// Radiance that needs no light: emission and the constant ambient term, or the base colour of an unlit surface. A white
-// surface reflects as much as reaches it.
+// Radiance that needs no light of the list: emission, the constant ambient term, and indirect light where it is asked for; or the
+// base colour of an unlit surface. A white surface reflects as much as reaches it.
 vec3 unlit_radiance(Surface s) {
-    return s.unlit ? s.base_color : s.emission + s.base_color * s.occlusion * frame.ambient_radiance;
+    if (s.unlit) {
+        return s.base_color;
+    }
+    vec3 radiance = s.emission + s.base_color * s.occlusion * frame.ambient_radiance;
+    return INDIRECT_SAMPLES > 0u ? radiance + indirect_radiance(s) : radiance;
 }
 
 #endif

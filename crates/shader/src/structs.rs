@@ -29,6 +29,14 @@ shader_struct! {
         pub unbounded_light_count: u32,
     }
 
+    /// How indirect light is gathered from a reflective shadow map (`include/indirect.glsl`).
+    pub struct RsmConstants {
+        /// World to clip of the light's view, columns.
+        pub clip_from_world: [[f32; 4]; 4],
+        /// Offset in shares of the map, area of the view's plane in m², unused.
+        pub samples: [[f32; 4]; 64],
+    }
+
     /// One draw: at most 1,024 triangles of one instance; four texels, and the vertex stream of instances
     /// (`include/scene.glsl`).
     pub struct DrawData {
@@ -106,8 +114,13 @@ shader_struct! {
 }
 
 /// Layouts that builds check by default.
-pub const LAYOUTS: &[crate::StructLayout] =
-    &[FrameConstants::LAYOUT, DrawData::LAYOUT, MaterialData::LAYOUT, LightData::LAYOUT];
+pub const LAYOUTS: &[crate::StructLayout] = &[
+    FrameConstants::LAYOUT,
+    RsmConstants::LAYOUT,
+    DrawData::LAYOUT,
+    MaterialData::LAYOUT,
+    LightData::LAYOUT,
+];
 
 /// `DrawData::flags`: negative determinant.
 pub const DRAW_MIRRORED: u32 = 1;

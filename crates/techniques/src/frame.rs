@@ -7,8 +7,8 @@ use afterlight_graph::{
 use afterlight_shader::Shader;
 
 use crate::{
-    SHADERS, capacity::Capacities, error::TechniqueError, light_list::LightList, params::Params,
-    scene_gpu::SceneGpu,
+    SHADERS, capacity::Capacities, error::TechniqueError, indirect::Rsm, light_list::LightList,
+    params::Params, scene_gpu::SceneGpu,
 };
 
 /// A frame to be recorded: the scene on the device, its buffers imported into the graph, sizes and parameters.
@@ -57,6 +57,8 @@ pub(crate) struct FrameBuffers {
     pub command_counts: BufferHandle,
     pub volume: BufferHandle,
     pub volume_indices: BufferHandle,
+    /// What indirect light is gathered from; none while it is made.
+    pub rsm: Option<Rsm>,
 }
 
 /// What binds resources to the slots of a pass: raster or compute.
@@ -162,7 +164,7 @@ impl Frame<'_> {
     }
 
     /// Binds what every pass over the scene may read, by the names of `include/*.glsl`: frame constants, draws, materials,
-    /// lights, vertices, textures. Slots that no shader of the pass has stay unused.
+    /// lights, what indirect light is gathered from, vertices, textures. Slots that no shader of the pass has stay unused.
     pub fn bind_scene(&self, pass: &mut impl Slots) {
         let b = &self.buffers;
         pass.read_buffer("FrameBlock", &b.frame);
@@ -174,6 +176,12 @@ impl Frame<'_> {
         pass.read_buffer("Positions", &b.positions);
         pass.read_buffer("Attributes", &b.attributes);
         pass.read_buffer("Indices", &b.indices);
+        if let Some(rsm) = &b.rsm {
+            // Without indirect light its code is gone, its slots are not: images of the same kinds fill them.
+            pass.read_buffer("RsmBlock", &rsm.constants);
+            pass.read_image("rsm_surface", rsm.images.as_ref().map_or(&b.materials, |i| &i.surface));
+            pass.read_image("rsm_flux", rsm.images.as_ref().map_or(&b.light_spheres, |i| &i.flux));
+        }
         pass.textures(&self.scene.texture_set);
     }
 
@@ -183,7 +191,10 @@ impl Frame<'_> {
             .constants
             .iter()
             .copied()
-            .chain([("ONLY_POINT_LIGHTS", u32::from(self.lights.only_points))])
+            .chain([
+                ("ONLY_POINT_LIGHTS", u32::from(self.lights.only_points)),
+                ("INDIRECT_SAMPLES", self.buffers.rsm.as_ref().map_or(0, Rsm::sample_count)),
+            ])
             .filter(|(name, _)| shaders.iter().any(|s| s.reflection.spec_constant(name).is_some()))
             .map(|(name, bits)| (name.to_owned(), bits))
             .collect()

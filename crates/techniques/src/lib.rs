@@ -3,7 +3,7 @@
 //! A technique answers four questions (what a surface leaves behind, how lights find it, where shading runs, how samples
 //! become pixels) and is one folder: `mod.rs` with its `TECHNIQUE`, its shaders, `variants.txt` that lists their variants,
 //! a README. The build collects the folders into [`registry`]. Stages that several techniques share stand beside them:
-//! [`geometry`], [`gbuffer`], [`volumes`], [`present`], [`post`].
+//! [`geometry`], [`gbuffer`], [`indirect`], [`volumes`], [`present`], [`post`].
 //!
 //! ```no_run
 //! use afterlight_techniques::{Params, Renderer, Settings, find, graph::gpu};
@@ -29,6 +29,7 @@ mod error;
 mod frame;
 pub mod gbuffer;
 pub mod geometry;
+pub mod indirect;
 mod light_list;
 pub mod multisample;
 mod params;
@@ -48,6 +49,7 @@ pub use capacity::Counter;
 pub use draw_list::{DrawOptions, DrawOrder};
 pub use error::TechniqueError;
 pub use frame::Frame;
+pub use indirect::Indirect;
 pub use light_list::LightList;
 pub use params::{ParamInfo, ParamKind, Params};
 pub use post::Post;

@@ -16,6 +16,7 @@ use crate::{
     error::TechniqueError,
     frame::{Frame, FrameBuffers},
     geometry::{MAX_DISPLACEMENT_M, MIN_TESSELLATE_PX},
+    indirect::{self, Indirect},
     light_list::LightList,
     params::Params,
     post::{self, Post},
@@ -55,6 +56,10 @@ pub struct Settings {
     pub tessellate_px: Option<f32>,
     /// How far tessellated surfaces are displaced along each axis at most, m; nothing without tessellation.
     pub displacement_m: f32,
+    /// Light that surfaces reflect onto each other.
+    pub indirect: Indirect,
+    /// Width and height of a light's view, texels, at least 1.
+    pub shadow_map_size_px: u32,
 }
 
 impl Settings {
@@ -73,6 +78,8 @@ impl Settings {
             post: Post::None,
             tessellate_px: None,
             displacement_m: 0.0,
+            indirect: Indirect::None,
+            shadow_map_size_px: indirect::DEFAULT_MAP_SIZE_PX,
         }
     }
 }
@@ -147,6 +154,11 @@ impl Renderer {
     /// The settings.
     pub fn settings(&self) -> &Settings {
         &self.settings
+    }
+
+    /// What of the settings this scene cannot give, a line each.
+    pub fn warnings(&self) -> Vec<String> {
+        indirect::warning(&self.settings, &self.scene).into_iter().collect()
     }
 
     /// Records a technique, plans its graph, allocates memory and compiles pipelines.
@@ -285,7 +297,7 @@ impl Renderer {
     ) -> Result<Prepared, TechniqueError> {
         let settings = &self.settings;
         let mut graph = Graph::new();
-        let frame = Frame {
+        let mut frame = Frame {
             width_px: settings.width_px,
             height_px: settings.height_px,
             samples: settings.samples,
@@ -302,6 +314,7 @@ impl Renderer {
             device: &self.device,
             capacities,
         };
+        indirect::record(&mut graph, &mut frame, settings)?;
         let hdr = technique.record(&mut graph, &frame)?;
         also(&mut graph, &hdr);
         let hdr_id = settings.keep_hdr.then(|| graph.keep(&hdr));
@@ -337,15 +350,18 @@ impl Renderer {
             command_counts: graph.import_buffer("draw counts", &draws.counts),
             volume: graph.import_buffer("light volume vertices", &self.volume),
             volume_indices: graph.import_buffer("light volume indices", &self.volume_indices),
+            rsm: None,
         }
     }
 }
 
 fn check_size(device: &gpu::Device, settings: &Settings) -> Result<(), TechniqueError> {
     let limit = u64::from(device.features().max_image_dimension_2d);
-    for (what, found) in
-        [("image width in pixels", settings.width_px), ("image height in pixels", settings.height_px)]
-    {
+    for (what, found) in [
+        ("image width in pixels", settings.width_px),
+        ("image height in pixels", settings.height_px),
+        ("shadow map size in pixels", settings.shadow_map_size_px),
+    ] {
         if u64::from(found) > limit || found == 0 {
             return Err(TechniqueError::TooLarge { what: what.to_owned(), found: found.into(), limit });
         }
@@ -417,14 +433,14 @@ impl Prepared {
 }
 
 /// A camera's matrices for an image size.
-struct View {
-    clip_from_world: Mat4,
+pub(crate) struct View {
+    pub clip_from_world: Mat4,
     view_from_world: Mat4,
-    eye_ws: Vec3,
+    pub eye_ws: Vec3,
 }
 
 impl View {
-    fn new(settings: &Settings) -> Self {
+    pub fn new(settings: &Settings) -> Self {
         let aspect = settings.width_px as f32 / settings.height_px as f32;
         let view_from_world = settings.camera.view_from_world();
         Self {
@@ -434,7 +450,7 @@ impl View {
         }
     }
 
-    fn constants(&self, settings: &Settings, lights: &LightList) -> FrameConstants {
+    pub fn constants(&self, settings: &Settings, lights: &LightList) -> FrameConstants {
         // The view looks along -z, so a point's distance is minus the third row of view_from_world.
         let distance_from_world = -self.view_from_world.row(2);
         let to_eye = self.view_from_world.row(2).truncate();
