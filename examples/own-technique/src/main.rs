@@ -40,6 +40,7 @@ static INFO: Info = Info {
     params: &[LEVELS],
     needs: &[],
     samples: &[1],
+    views: &[],
     tessellation: false,
 };
 
