@@ -48,7 +48,8 @@ vec4 tangent_from_changes(vec3 normal_ws, vec3 dp_dx, vec3 dp_dy, TextureCoordin
 }
 
 SurfacePoint interpolated_point(uint index, ivec2 pixel, out uint material) {
-    uint record = index * RECORD_WORDS;
+    // In a frame that has more triangles than room, which is recorded again, those without a place show the last.
+    uint record = min(index, uint(triangle_buffer.length()) / RECORD_WORDS - 1u) * RECORD_WORDS;
     uint packed_anchor = triangle_buffer[record + 19u];
     vec2 from_anchor = vec2(pixel - ivec2(packed_anchor & 0xffffu, packed_anchor >> 16));
     vec2 center = vec2(pixel) + 0.5;
