@@ -128,4 +128,13 @@ vec3 unlit_radiance(Surface s) {
     return INDIRECT_SAMPLES > 0u ? radiance + indirect_radiance(s) : radiance;
 }
 
+// Radiance that leaves a surface under every light.
+vec3 surface_radiance(Surface s) {
+    vec3 radiance = unlit_radiance(s);
+    if (!s.unlit) {
+        radiance += all_lights_radiance(shading_point(s));
+    }
+    return radiance;
+}
+
 #endif

@@ -9,8 +9,8 @@ use crate::{
     TechniqueError, compute_raster,
     cost::{self, Cost, Workload},
     geometry::Surfaces,
-    multisample::{self, NO_TRIANGLE_RGBA8},
-    triangle_buffer::{self, Visible},
+    multisample::{self, NO_TRIANGLE_RGBA8, Visible},
+    triangle_buffer,
 };
 
 /// The technique.
@@ -121,18 +121,12 @@ impl Technique for Dais {
         if frame.params.text(&INFO, FILL.key) == "cache" {
             return record_cached(graph, frame);
         }
-        let visible = match compute_raster::is_chosen(frame, &INFO)? {
-            true => {
-                let keys = compute_raster::rasterize(graph, frame, &INFO, frame.samples)?;
-                Visible::Keys { keys, samples: frame.samples }
-            }
-            false => raster_ids(graph, frame)?,
-        };
+        let visible = Visible::find(graph, frame, &INFO, frame.samples)?;
         let triangles = triangle_buffer::fill(graph, frame, INFO.id, &visible)?;
         let source = format!("dais{}", visible.tag('-'));
         let lights = frame.params.text(&INFO, multisample::LIGHTS.key);
         multisample::shade(graph, frame, INFO.id, (&source, frame.samples), lights, |pass| {
-            visible.bind(pass, true);
+            visible.bind(frame, pass);
             triangles.bind(pass);
         })
     }
@@ -187,25 +181,7 @@ fn record_cached(graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, Te
     let source = format!("dais-refs{}", visible.tag('-'));
     let lights = frame.params.text(&INFO, multisample::LIGHTS.key);
     multisample::shade(graph, frame, INFO.id, (&source, frame.samples), lights, |pass| {
-        visible.bind(pass, true);
+        visible.bind(frame, pass);
         pass.read("TriangleBuffer", &triangles);
     })
-}
-
-/// Declares the pass `dais/ids`: a triangle ID and depth at every sample.
-fn raster_ids(graph: &mut Graph, frame: &Frame<'_>) -> Result<Visible, TechniqueError> {
-    let ids = graph.image("dais/ids", frame.multisampled_info(vk::Format::R8G8B8A8_UNORM));
-    let depth = graph.image("dais/depth", frame.multisampled_info(vk::Format::D32_SFLOAT));
-    let surfaces = Surfaces::new(
-        frame,
-        ("geometry/surface.vert#position", Some("visibility/ids.frag#rgba8")),
-        ("geometry/surface.vert#uv", "visibility/ids.frag#rgba8-mask"),
-    )?;
-    let mut pass = graph.raster("dais/ids");
-    frame.bind_scene(&mut pass);
-    let ids = pass.color(ids, Load::Clear(NO_TRIANGLE_RGBA8));
-    let depth = pass.depth(depth, Load::Clear(0.0));
-    surfaces.draw(frame, &mut pass);
-    pass.finish();
-    Ok(Visible::Ids { ids, depth, samples: frame.samples })
 }

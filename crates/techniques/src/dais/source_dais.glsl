@@ -7,31 +7,16 @@
 #ifndef REFERENCES
 #include "triangle_buffer/index.glsl"
 #endif
-#ifdef SAMPLES_IN_KEYS
-uint sample_triangle(ivec2 pixel, uint i) {
-    return ~sample_keys[sample_word(pixel, i)];
-}
-#else
-layout(set = 0, binding = 9) uniform SAMPLED_IMAGE ids;
-
-uint sample_triangle(ivec2 pixel, uint i) {
-    return packUnorm4x8(FETCH_SAMPLE(ids, pixel, i));
-}
-#endif
+#define IDS_BINDING 9
+#include "multisample/triangles.glsl"
 
 ivec2 source_pixel;
 uint source_mask;           // samples that need to be shaded
 uint source_background;     // samples without a surface
 
-// Bounds of what a tile's lights must reach, from the depth buffer.
-float source_distance(ivec2 pixel, uint i) {
-    float depth = SAMPLE_DEPTH(pixel, i);
-    return depth == 0.0 ? -1.0 : distance_from_depth(depth);
-}
-
 void source_begin(ivec2 pixel) {
     source_pixel = pixel;
-    source_mask = 0xffffffffu >> (32u - SAMPLES);
+    source_mask = all_samples();
     source_background = 0u;
 }
 
@@ -39,18 +24,17 @@ bool source_next(out Surface s, out uint weight) {
     weight = 0u;
     uint id = NO_TRIANGLE;
     while (weight == 0u && source_mask != 0u) {
-        uint first = uint(findLSB(source_mask));
-        id = sample_triangle(source_pixel, first);
 #ifdef REFERENCES
+        uint first = 1u << uint(findLSB(source_mask));
+        id = sample_triangle(source_pixel, uint(findLSB(source_mask)));
         // Of what the triangle covers, what no triangle before has had.
-        uint same = id == NO_TRIANGLE ? 1u << first : (id >> 24 | 1u << first) & source_mask;
-#else
-        uint same = 1u << first;
-        for (uint i = first + 1u; i < SAMPLES; ++i) {
-            same |= (source_mask >> i & 1u) != 0u && sample_triangle(source_pixel, i) == id ? 1u << i : 0u;
-        }
-#endif
+        uint same = id == NO_TRIANGLE ? first : (id >> 24 | first) & source_mask;
         source_mask &= ~same;
+#else
+        Visible v = take_triangle(source_pixel, source_mask);
+        id = v.id;
+        uint same = v.samples;
+#endif
         if (id == NO_TRIANGLE) {
             source_background += uint(bitCount(same));
         } else {

@@ -13,12 +13,6 @@ uint source_link;           // head or next node plus one; 0 at the end
 uint source_sum;
 uint source_background;     // samples without a surface
 
-// Bounds of what a tile's lights must reach, from the depth buffer.
-float source_distance(ivec2 pixel, uint i) {
-    float depth = SAMPLE_DEPTH(pixel, i);
-    return depth == 0.0 ? -1.0 : distance_from_depth(depth);
-}
-
 void source_begin(ivec2 pixel) {
     source_pixel = pixel;
     source_link = heads[uint(pixel.y) * frame.size_px.x + uint(pixel.x)];
@@ -29,9 +23,7 @@ void source_begin(ivec2 pixel) {
 bool source_next(out Surface s, out uint weight) {
     if (source_link == 0u) {
         // Samples that were dropped for want of nodes are not the background: the depth buffer tells.
-        for (uint i = 0u; i < SAMPLES && source_sum < SAMPLES; ++i) {
-            source_background += SAMPLE_DEPTH(source_pixel, i) == 0.0 ? 1u : 0u;
-        }
+        source_background = source_sum < SAMPLES ? samples_without_surface(source_pixel) : 0u;
         return false;
     }
     uint place = source_link & 0x7fffffffu;

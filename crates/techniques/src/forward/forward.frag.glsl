@@ -14,9 +14,5 @@ void main() {
     vec4 base = visible_base_color(m, p);
     count_invocation();
     Surface s = surface_at(m, p, base.rgb);
-    vec3 radiance = unlit_radiance(s);
-    if (!s.unlit) {
-        radiance += all_lights_radiance(shading_point(s));
-    }
-    radiance_out = vec4(radiance, 1.0);
+    radiance_out = vec4(surface_radiance(s), 1.0);
 }

@@ -18,49 +18,10 @@
 #include "gbuffer_list/filter.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
-#ifdef SAMPLES_IN_KEYS
-#include "compute_raster/key_ids.glsl"
-#else
-layout(set = 0, binding = 8) uniform SAMPLED_IMAGE ids;
-#endif
+#define IDS_BINDING 8
+#include "multisample/triangles.glsl"
 
 ivec2 pixel;
-
-#ifdef SAMPLES_IN_KEYS
-uint sample_id(uint i) {
-    return sample_order(pixel, i);
-}
-
-uint triangle_id(uint order) {
-    return triangle_id_from_order(order);
-}
-#else
-uint triangle_id(uint id) {
-    return id;
-}
-
-uint sample_id(uint i) {
-    return packUnorm4x8(FETCH_SAMPLE(ids, pixel, i));
-}
-
-#endif
-
-// A triangle that shows in the pixel.
-struct Visible {
-    uint id;        // NO_TRIANGLE: there is none
-    uint samples;   // mask of the samples that show it
-};
-
-// Takes the first triangle out of a mask of samples, those without a surface as well.
-Visible take_triangle(inout uint mask) {
-    uint first = uint(findLSB(mask));
-    Visible v = Visible(sample_id(first), 1u << first);
-    for (uint i = first + 1u; i < SAMPLES; ++i) {
-        v.samples |= (mask >> i & 1u) != 0u && sample_id(i) == v.id ? 1u << i : 0u;
-    }
-    mask &= ~v.samples;
-    return v;
-}
 
 float sample_distance(uint i) {
     return distance_from_depth(SAMPLE_DEPTH(pixel, i));
@@ -73,18 +34,12 @@ bool is_filtered(Visible v) {
 // Takes the next triangle that a block is written for; `NO_TRIANGLE` where there is none left.
 Visible next_stored(inout uint mask) {
     while (mask != 0u) {
-        Visible v = take_triangle(mask);
+        Visible v = take_triangle(pixel, mask);
         if (v.id != NO_TRIANGLE && !is_filtered(v)) {
             return v;
         }
     }
     return Visible(NO_TRIANGLE, 0u);
-}
-
-const uint ALL = 0xffffffffu;
-
-uint all_samples() {
-    return ALL >> (32u - SAMPLES);
 }
 
 // The surface at the pixel's centre, which may be none.
@@ -94,7 +49,7 @@ Visible center_triangle() {
     float nearest_depth = -1.0;
     bool background = false;
     for (uint mask = all_samples(); mask != 0u;) {
-        Visible v = take_triangle(mask);
+        Visible v = take_triangle(pixel, mask);
         if (v.id == NO_TRIANGLE) {
             background = true;
             continue;
@@ -118,7 +73,7 @@ bool surfaces_differ() {
     vec2 ndc = ndc_from_pixel(uvec2(pixel));
     uint mask = all_samples();
     uint first_material, material;
-    Visible v = take_triangle(mask);
+    Visible v = take_triangle(pixel, mask);
     if (v.id == NO_TRIANGLE) {
         return mask != 0u;
     }
@@ -130,7 +85,7 @@ bool surfaces_differ() {
                - position_from_depth(ndc, depth_from_distance(distance_m));
     float pixel_m = length(right);
     while (mask != 0u) {
-        v = take_triangle(mask);
+        v = take_triangle(pixel, mask);
         if (v.id == NO_TRIANGLE) {
             return true;
         }
@@ -156,7 +111,7 @@ void main() {
     bool single = false;
     if (inside) {
         for (uint mask = all_samples(); mask != 0u;) {
-            Visible v = take_triangle(mask);
+            Visible v = take_triangle(pixel, mask);
             if (v.id != NO_TRIANGLE) {
                 covered |= v.samples;
                 if (!is_filtered(v)) {

@@ -14,7 +14,7 @@ use crate::{
     cost::{self, Cost, Workload},
     depth_prepass::FIRST_FRAGMENT,
     geometry::Surfaces,
-    multisample::{self, NO_TRIANGLE_RGBA8},
+    multisample::{self, Visible},
 };
 
 /// The technique.
@@ -217,12 +217,9 @@ impl Technique for GbufferList {
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let layout = Layout::new(frame)?;
-        let by_raster = frame.params.text(&INFO, FILL.key) == "raster";
-        let keys = !by_raster && compute_raster::is_chosen(frame, &INFO)?;
-        let lists = match (by_raster, keys) {
-            (true, _) => fill_by_raster(graph, frame, &layout)?,
-            (false, true) => fill_from_keys(graph, frame, &layout)?,
-            (false, false) => fill_by_compute(graph, frame, &layout)?,
+        let lists = match frame.params.text(&INFO, FILL.key) {
+            "raster" => fill_by_raster(graph, frame, &layout)?,
+            _ => fill_by_compute(graph, frame, &layout)?,
         };
         frame.watch(graph, "blocks", &lists.count, layout.capacity, layout.is_fixed);
         let lights = frame.params.text(&INFO, multisample::LIGHTS.key);
@@ -286,54 +283,26 @@ fn build_constants(frame: &Frame<'_>, layout: &Layout) -> Vec<(String, u32)> {
     all
 }
 
-/// Triangle IDs at every sample in one pass over the scene, then a thread a pixel that writes its list.
+/// The triangle of every sample, then a thread a pixel that writes its list.
 fn fill_by_compute(graph: &mut Graph, frame: &Frame<'_>, layout: &Layout) -> Result<Lists, TechniqueError> {
-    let ids =
-        graph.image("gbuffer-list/ids", frame.image_info(vk::Format::R8G8B8A8_UNORM).samples(layout.samples));
-    let depth =
-        graph.image("gbuffer-list/depth", frame.image_info(vk::Format::D32_SFLOAT).samples(layout.samples));
-    let surfaces = Surfaces::new(
-        frame,
-        ("geometry/surface.vert#position", Some("visibility/ids.frag#rgba8")),
-        ("geometry/surface.vert#uv", "visibility/ids.frag#rgba8-mask"),
-    )?;
+    let visible = Visible::find(graph, frame, &INFO, layout.samples)?;
     let (blocks, count, flagged) = empty_lists(graph, frame, layout)?;
-
-    let mut pass = graph.raster("gbuffer-list/ids");
-    frame.bind_scene(&mut pass);
-    let ids = pass.color(ids, Load::Clear(NO_TRIANGLE_RGBA8));
-    let depth = pass.depth(depth, Load::Clear(0.0));
-    surfaces.draw(frame, &mut pass);
-    pass.finish();
-
-    let shader = if layout.samples == 1 { "gbuffer_list/fill.comp#one" } else { "gbuffer_list/fill.comp" };
-    let mut pass = frame.compute(graph, "gbuffer-list/fill", &frame.shader(shader)?);
+    let shader = frame.shader(&format!("gbuffer_list/fill.comp{}", visible.tag('#')))?;
+    let mut pass = frame.compute(graph, "gbuffer-list/fill", &shader);
     for (name, value) in build_constants(frame, layout) {
         pass.constant(&name, value);
     }
-    pass.read("ids", &ids).read("gbuffer_depth", &depth).read("SingleSampleDraws", &flagged);
-    let blocks = pass.write("Blocks", blocks);
-    let count = pass.write("BlockCount", count);
-    pass.dispatch(frame.groups(8));
-    pass.finish();
-    Ok(Lists { blocks, count, samples: Samples::Depth(depth) })
-}
-
-/// As [`fill_by_compute`], the triangles found in compute as well.
-fn fill_from_keys(graph: &mut Graph, frame: &Frame<'_>, layout: &Layout) -> Result<Lists, TechniqueError> {
-    let keys = compute_raster::rasterize(graph, frame, &INFO, layout.samples)?;
-    let (blocks, count, flagged) = empty_lists(graph, frame, layout)?;
-    let mut pass = frame.compute(graph, "gbuffer-list/fill", &frame.shader("gbuffer_list/fill.comp#keys")?);
-    for (name, value) in build_constants(frame, layout) {
-        pass.constant(&name, value);
-    }
-    pass.read("SampleKeys", &keys).read("DrawCommands", &frame.buffers.commands);
+    visible.bind(frame, &mut pass);
     pass.read("SingleSampleDraws", &flagged);
     let blocks = pass.write("Blocks", blocks);
     let count = pass.write("BlockCount", count);
     pass.dispatch(frame.groups(8));
     pass.finish();
-    Ok(Lists { blocks, count, samples: Samples::Keys(keys) })
+    let samples = match visible {
+        Visible::Ids { depth, .. } => Samples::Depth(depth),
+        Visible::Keys { keys, .. } => Samples::Keys(keys),
+    };
+    Ok(Lists { blocks, count, samples })
 }
 
 /// A depth pre-pass, then fragments that write themselves where they show (the paper's section 3).

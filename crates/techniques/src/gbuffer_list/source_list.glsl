@@ -15,12 +15,6 @@ bool source_ended;
 uint source_sum;            // weights so far
 uint source_background;     // samples without a surface
 
-// Bounds of what a tile's lights must reach, from the depth buffer.
-float source_distance(ivec2 pixel, uint i) {
-    float depth = SAMPLE_DEPTH(pixel, i);
-    return depth == 0.0 ? -1.0 : distance_from_depth(depth);
-}
-
 // What a block says of itself; with narrow pointers only the pixel's own block has to.
 Coverage own_coverage(uint block, uint normal) {
     if (POINTER_WORDS == 2u) {
@@ -54,18 +48,10 @@ void source_begin(ivec2 pixel) {
     }
 }
 
-uint samples_without_surface() {
-    uint count = 0u;
-    for (uint i = 0u; i < SAMPLES; ++i) {
-        count += SAMPLE_DEPTH(source_pixel, i) == 0.0 ? 1u : 0u;
-    }
-    return count;
-}
-
 bool source_next(out Surface s, out uint weight) {
     if (source_ended) {
         // A sum of all samples leaves no room for the background: the depth buffer is read at edges alone.
-        source_background = source_sum < SAMPLES ? samples_without_surface() : 0u;
+        source_background = source_sum < SAMPLES ? samples_without_surface(source_pixel) : 0u;
         return false;
     }
     uint block = source_block;

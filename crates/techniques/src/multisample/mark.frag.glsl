@@ -4,15 +4,10 @@
 #extension GL_GOOGLE_include_directive : require
 #include "frame.glsl"
 #include "multisample/samples.glsl"
-
-layout(set = 0, binding = 11) uniform texture2DMS gbuffer_roughness;
+#include "multisample/edge_mark.glsl"
 
 void main() {
-    float edge = 0.0;
-    for (uint i = 0u; i < SAMPLES; ++i) {
-        edge = max(edge, texelFetch(gbuffer_roughness, ivec2(gl_FragCoord.xy), int(i)).b);
-    }
-    if (edge < 0.5) {
+    if (!is_edge(ivec2(gl_FragCoord.xy))) {
         discard;
     }
 }

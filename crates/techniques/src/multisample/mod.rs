@@ -8,6 +8,10 @@
 //!
 //! Scenes with emissive surfaces take four bytes more.
 
+mod visible;
+
+pub use visible::Visible;
+
 use afterlight_graph::{BufferHandle, ComputePass, Graph, ImageHandle, Load, RasterPass, gpu::vk};
 
 use crate::{
@@ -109,7 +113,7 @@ pub fn fill_dedup(
     let images = [
         ("gbuffer_base_color", vk::Format::R8G8B8A8_SRGB, Load::DontCare),
         ("gbuffer_normal", vk::Format::R8G8B8A8_UNORM, Load::DontCare),
-        ("gbuffer_id", vk::Format::R8G8B8A8_UNORM, Load::Clear(NO_TRIANGLE_RGBA8)),
+        ("ids", vk::Format::R8G8B8A8_UNORM, Load::Clear(NO_TRIANGLE_RGBA8)),
         ("gbuffer_distance", vk::Format::R8G8B8A8_UNORM, Load::DontCare),
     ];
     fill(graph, frame, technique, &surfaces, &images, count)

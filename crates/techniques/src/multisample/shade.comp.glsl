@@ -62,11 +62,7 @@ void main() {
     if (inside) {
         source_begin(pixel);
         while (source_next(s, weight)) {
-            vec3 of_surface = unlit_radiance(s);
-            if (!s.unlit) {
-                of_surface += all_lights_radiance(shading_point(s));
-            }
-            radiance += float(weight) * of_surface;
+            radiance += float(weight) * surface_radiance(s);
             ++shaded_count;
             weight_sum += weight;
         }

@@ -1,7 +1,7 @@
 // Shades the surfaces of a pixel and averages them by their weights, whatever holds them: a SOURCE_* macro names it.
 //
-// A source has four parts: source_begin(pixel), source_next(surface, weight) until it is false, and source_background, the
-// samples without a surface; source_distance(pixel, sample) bounds what lights must reach. Weights are samples; they and the background sum to SAMPLES.
+// A source has three parts: source_begin(pixel), source_next(surface, weight) until it is false, and source_background, the
+// samples without a surface. Weights are samples; they and the background sum to SAMPLES.
 #include "shading.glsl"
 #include "heat.glsl"
 #include "multisample/samples.glsl"
@@ -9,6 +9,22 @@
 #ifndef SAMPLES_IN_KEYS
 layout(set = 0, binding = 8) uniform SAMPLED_IMAGE gbuffer_depth;
 #endif
+
+#ifndef SOURCE_DEDUP
+// View distance of a sample's surface, negative without one: bounds of what a tile's lights must reach.
+float source_distance(ivec2 pixel, uint i) {
+    float depth = SAMPLE_DEPTH(pixel, i);
+    return depth == 0.0 ? -1.0 : distance_from_depth(depth);
+}
+#endif
+
+uint samples_without_surface(ivec2 pixel) {
+    uint count = 0u;
+    for (uint i = 0u; i < SAMPLES; ++i) {
+        count += SAMPLE_DEPTH(pixel, i) == 0.0 ? 1u : 0u;
+    }
+    return count;
+}
 
 #if defined(SOURCE_DEDUP)
 #include "multisample/source_dedup.glsl"

@@ -2,7 +2,8 @@
 // Dachsbacher 2015, section 5 and Listing 1).
 layout(set = 0, binding = 9) uniform texture2DMS gbuffer_base_color;
 layout(set = 0, binding = 10) uniform texture2DMS gbuffer_normal;
-layout(set = 0, binding = 11) uniform texture2DMS gbuffer_id;
+#define IDS_BINDING 11
+#include "multisample/triangles.glsl"
 layout(set = 0, binding = 12) uniform texture2DMS gbuffer_distance;
 #ifdef EMISSION
 layout(set = 0, binding = 16) uniform texture2DMS gbuffer_emission;
@@ -11,10 +12,6 @@ layout(set = 0, binding = 16) uniform texture2DMS gbuffer_emission;
 ivec2 source_pixel;
 uint source_mask;           // samples that need to be shaded
 uint source_background;     // samples without a surface
-
-uint sample_id(uint i) {
-    return packUnorm4x8(texelFetch(gbuffer_id, source_pixel, int(i)));
-}
 
 float distance_from_word(uint distance_occlusion) {
     return uintBitsToFloat((distance_occlusion & 0xffffffu) << 7);
@@ -29,7 +26,7 @@ float source_distance(ivec2 pixel, uint i) {
 
 void source_begin(ivec2 pixel) {
     source_pixel = pixel;
-    source_mask = (1u << SAMPLES) - 1u;
+    source_mask = all_samples();
     source_background = 0u;
 }
 
@@ -38,17 +35,12 @@ bool source_next(out Surface s, out uint weight) {
     weight = 0u;
     uint first = 0u;
     while (weight == 0u && source_mask != 0u) {
-        first = uint(findLSB(source_mask));
-        uint id = sample_id(first);
-        uint same = 1u << first;
-        for (uint i = first + 1u; i < SAMPLES; ++i) {
-            same |= (source_mask >> i & 1u) != 0u && sample_id(i) == id ? 1u << i : 0u;
-        }
-        source_mask &= ~same;
-        if (id == NO_TRIANGLE) {
-            source_background = uint(bitCount(same));
+        Visible v = take_triangle(source_pixel, source_mask);
+        first = uint(findLSB(v.samples));
+        if (v.id == NO_TRIANGLE) {
+            source_background = uint(bitCount(v.samples));
         } else {
-            weight = uint(bitCount(same));
+            weight = uint(bitCount(v.samples));
         }
     }
     if (weight == 0u) {

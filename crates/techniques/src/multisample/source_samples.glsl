@@ -2,9 +2,10 @@
 //
 // SOURCE_SSAA: every sample. SOURCE_MSAA: every sample where a triangle's edge crosses the pixel, else the first alone;
 // PIXEL_RATE and SAMPLE_RATE say which before.
+#include "multisample/edge_mark.glsl"
+
 layout(set = 0, binding = 9) uniform texture2DMS gbuffer_base_color;
 layout(set = 0, binding = 10) uniform texture2DMS gbuffer_normal;
-layout(set = 0, binding = 11) uniform texture2DMS gbuffer_roughness;
 #ifdef EMISSION
 layout(set = 0, binding = 12) uniform texture2DMS gbuffer_emission;
 #endif
@@ -14,14 +15,6 @@ uint source_index;          // next sample to look at
 uint source_end;
 uint source_weight;
 uint source_background;     // samples without a surface
-
-bool is_edge(ivec2 pixel) {
-    float edge = 0.0;
-    for (uint i = 0u; i < SAMPLES; ++i) {
-        edge = max(edge, texelFetch(gbuffer_roughness, pixel, int(i)).b);
-    }
-    return edge > 0.5;
-}
 
 void source_begin(ivec2 pixel) {
     source_pixel = pixel;
@@ -36,12 +29,6 @@ void source_begin(ivec2 pixel) {
 #endif
     source_end = sample_rate ? SAMPLES : 1u;
     source_weight = sample_rate ? 1u : SAMPLES;
-}
-
-// View distance of a sample, negative without a surface.
-float source_distance(ivec2 pixel, uint i) {
-    float depth = texelFetch(gbuffer_depth, pixel, int(i)).r;
-    return depth == 0.0 ? -1.0 : distance_from_depth(depth);
 }
 
 // Depth at the centre of a pixel that one triangle covers: depth is affine on the screen, and the mean of the standard

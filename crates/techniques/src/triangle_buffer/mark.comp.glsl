@@ -5,25 +5,13 @@
 #extension GL_GOOGLE_include_directive : require
 #include "frame.glsl"
 #include "scene.glsl"
-#ifdef SAMPLES_IN_KEYS
-#include "compute_raster/key_ids.glsl"
-#else
-#include "multisample/samples.glsl"
-layout(set = 0, binding = 8) uniform SAMPLED_IMAGE ids;
-#endif
+#define IDS_BINDING 8
+#include "multisample/triangles.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(set = 0, binding = 10, scalar) buffer MarkedBits {
     uint marked_bits[];
 };
-
-uint sample_triangle(ivec2 pixel, uint i) {
-#ifdef SAMPLES_IN_KEYS
-    return sample_order(pixel, i);
-#else
-    return packUnorm4x8(FETCH_SAMPLE(ids, pixel, i));
-#endif
-}
 
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);

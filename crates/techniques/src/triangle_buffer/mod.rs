@@ -6,12 +6,13 @@
 //! turn bits into places, and a thread a marked triangle writes its record. No lock, no cache, each triangle once, in the order
 //! of draws.
 
-use afterlight_graph::{BufferHandle, Graph, ImageHandle, RasterPass};
+use afterlight_graph::{BufferHandle, Graph, RasterPass};
 
 use crate::{
     capacity,
     error::TechniqueError,
     frame::{Frame, Slots},
+    multisample::Visible,
     scene_gpu::DRAW_TRIANGLES,
 };
 
@@ -21,57 +22,6 @@ const FIRST_GUESS: u32 = 1 << 12;
 const WORDS_A_DRAW: u64 = DRAW_TRIANGLES as u64 / 32;
 /// Triangles of a group: `local_size_x` in `derivatives.comp.glsl`.
 const GROUP_TRIANGLES: u32 = 128;
-
-/// What samples show: triangle IDs, or keys of `compute_raster`.
-pub enum Visible {
-    /// Triangle IDs, four bytes as RGBA8, and depth, of `samples` samples a pixel.
-    Ids {
-        /// `draw << 10 | triangle`.
-        ids: ImageHandle,
-        /// Reversed.
-        depth: ImageHandle,
-        /// Samples a pixel.
-        samples: u32,
-    },
-    /// Depth and place in the order of draws.
-    Keys {
-        /// A key a sample.
-        keys: BufferHandle,
-        /// Samples a pixel.
-        samples: u32,
-    },
-}
-
-impl Visible {
-    /// Samples a pixel.
-    pub fn samples(&self) -> u32 {
-        match self {
-            Self::Ids { samples, .. } | Self::Keys { samples, .. } => *samples,
-        }
-    }
-
-    /// Tag of shader variants that read it, with a separator before it; empty for the plain one.
-    pub fn tag(&self, separator: char) -> String {
-        match self {
-            Self::Ids { samples: 1, .. } => format!("{separator}one"),
-            Self::Ids { .. } => String::new(),
-            Self::Keys { .. } => format!("{separator}keys"),
-        }
-    }
-
-    /// Binds what shaders read of it; those that shade read depth as well.
-    pub fn bind(&self, pass: &mut impl Slots, with_depth: bool) {
-        match self {
-            Self::Ids { ids, depth, .. } => {
-                pass.read_image("ids", ids);
-                if with_depth {
-                    pass.read_image("gbuffer_depth", depth);
-                }
-            }
-            Self::Keys { keys, .. } => pass.read_buffer("SampleKeys", keys),
-        }
-    }
-}
 
 /// A filled triangle buffer with the index from triangles to their places.
 pub struct TriangleBuffer {
@@ -203,7 +153,7 @@ pub fn fill(
     let shader = frame.shader(&format!("triangle_buffer/mark.comp{}", visible.tag('#')))?;
     let mut pass = frame.compute(graph, &name("mark"), &shader);
     pass.constant("SAMPLES", visible.samples());
-    visible.bind(&mut pass, false);
+    visible.bind(frame, &mut pass);
     let bits = pass.write("MarkedBits", bits);
     pass.dispatch(frame.groups(8));
     pass.finish();

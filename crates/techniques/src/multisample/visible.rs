@@ -1,0 +1,97 @@
+//! What every sample shows: the pass over the scene, or its rasterisation in compute, that techniques begin with which
+//! fetch triangles by their IDs.
+
+use afterlight_graph::{BufferHandle, Graph, ImageHandle, Load, gpu::vk};
+
+use super::NO_TRIANGLE_RGBA8;
+use crate::{
+    Info, compute_raster,
+    error::TechniqueError,
+    frame::{Frame, Slots},
+    geometry::Surfaces,
+};
+
+/// What samples show, as `multisample/triangles.glsl` reads it: triangle IDs, or keys of [`compute_raster`].
+pub enum Visible {
+    /// Triangle IDs, four bytes as RGBA8, and depth, of `samples` samples a pixel.
+    Ids {
+        /// `draw << 10 | triangle`.
+        ids: ImageHandle,
+        /// Reversed.
+        depth: ImageHandle,
+        /// Samples a pixel.
+        samples: u32,
+    },
+    /// Depth and place in the order of draws.
+    Keys {
+        /// A key a sample.
+        keys: BufferHandle,
+        /// Samples a pixel.
+        samples: u32,
+    },
+}
+
+impl Visible {
+    /// Declares what finds the triangles at `samples` samples a pixel: the passes of [`compute_raster`] where the technique's
+    /// parameter [`compute_raster::VISIBILITY`] says so, else the pass `technique/ids`.
+    ///
+    /// # Errors
+    /// Those of [`compute_raster::is_chosen`] and [`compute_raster::rasterize`].
+    pub fn find(
+        graph: &mut Graph,
+        frame: &Frame<'_>,
+        info: &Info,
+        samples: u32,
+    ) -> Result<Self, TechniqueError> {
+        if compute_raster::is_chosen(frame, info)? {
+            let keys = compute_raster::rasterize(graph, frame, info, samples)?;
+            return Ok(Self::Keys { keys, samples });
+        }
+        let name = |part: &str| format!("{}/{part}", info.id);
+        let image = |format| frame.image_info(format).samples(samples);
+        let ids = graph.image(&name("ids"), image(vk::Format::R8G8B8A8_UNORM));
+        let depth = graph.image(&name("depth"), image(vk::Format::D32_SFLOAT));
+        let surfaces = Surfaces::new(
+            frame,
+            ("geometry/surface.vert#position", Some("visibility/ids.frag#rgba8")),
+            ("geometry/surface.vert#uv", "visibility/ids.frag#rgba8-mask"),
+        )?;
+        let mut pass = graph.raster(&name("ids"));
+        frame.bind_scene(&mut pass);
+        let ids = pass.color(ids, Load::Clear(NO_TRIANGLE_RGBA8));
+        let depth = pass.depth(depth, Load::Clear(0.0));
+        surfaces.draw(frame, &mut pass);
+        pass.finish();
+        Ok(Self::Ids { ids, depth, samples })
+    }
+
+    /// Samples a pixel.
+    pub fn samples(&self) -> u32 {
+        match self {
+            Self::Ids { samples, .. } | Self::Keys { samples, .. } => *samples,
+        }
+    }
+
+    /// Tag of shader variants that read it, with a separator before it; empty for the plain one.
+    pub fn tag(&self, separator: char) -> String {
+        match self {
+            Self::Ids { samples: 1, .. } => format!("{separator}one"),
+            Self::Ids { .. } => String::new(),
+            Self::Keys { .. } => format!("{separator}keys"),
+        }
+    }
+
+    /// Binds what shaders read of it. Slots that no shader of the pass has stay unused.
+    pub fn bind(&self, frame: &Frame<'_>, pass: &mut impl Slots) {
+        match self {
+            Self::Ids { ids, depth, .. } => {
+                pass.read_image("ids", ids);
+                pass.read_image("gbuffer_depth", depth);
+            }
+            Self::Keys { keys, .. } => {
+                pass.read_buffer("SampleKeys", keys);
+                pass.read_buffer("DrawCommands", &frame.buffers.commands);
+            }
+        }
+    }
+}
