@@ -38,8 +38,8 @@ vec3 texel_irradiance(Surface s, ivec2 texel, float area, float least_distance_s
     return flux * (area * emitted * received / (distance_sq * distance_sq));
 }
 
-// Radiance towards the eye by light that one surface has reflected before, of the diffuse lobe alone.
-vec3 indirect_radiance(Surface s) {
+// Irradiance of a point by the samples from `first` to `end`.
+vec3 gathered_irradiance(Surface s, uint first, uint end) {
     vec4 clip = rsm.clip_from_world * vec4(s.position_ws, 1.0);
     if (clip.w <= 0.0) {
         return vec3(0.0);   // behind the light: it has no place in the map
@@ -47,7 +47,7 @@ vec3 indirect_radiance(Surface s) {
     vec2 place = clip.xy / clip.w * 0.5 + 0.5;
     vec2 size = vec2(textureSize(rsm_flux, 0));
     vec3 irradiance = vec3(0.0);
-    for (uint i = 0u; i < INDIRECT_SAMPLES; ++i) {
+    for (uint i = first; i < end; ++i) {
         vec4 pattern = rsm.samples[i];
         vec2 at = place + pattern.xy;
         // Outside of the map nothing is lit.
@@ -56,7 +56,25 @@ vec3 indirect_radiance(Surface s) {
             irradiance += texel_irradiance(s, ivec2(at * size), pattern.z, least_distance_sq);
         }
     }
-    return s.base_color * ((1.0 - s.metallic) * s.occlusion / PI) * irradiance;
+    return irradiance;
+}
+
+#ifdef LOW_RATE
+// Of the surface that is shaded: whoever shades has found it before (dais_multirate/low_rate.glsl).
+vec3 low_rate_irradiance;
+
+vec3 indirect_irradiance(Surface s) {
+    return low_rate_irradiance;
+}
+#else
+vec3 indirect_irradiance(Surface s) {
+    return gathered_irradiance(s, 0u, INDIRECT_SAMPLES);
+}
+#endif
+
+// Radiance towards the eye by light that one surface has reflected before, of the diffuse lobe alone.
+vec3 indirect_radiance(Surface s) {
+    return s.base_color * ((1.0 - s.metallic) * s.occlusion / PI) * indirect_irradiance(s);
 }
 
 #endif

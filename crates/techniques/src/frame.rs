@@ -153,6 +153,11 @@ impl Frame<'_> {
         }
     }
 
+    /// Whether indirect light is asked for and there is some.
+    pub fn has_indirect_light(&self) -> bool {
+        self.buffers.rsm.as_ref().is_some_and(|rsm| rsm.sample_count() > 0)
+    }
+
     /// Whether the device is a CPU.
     pub fn is_cpu(&self) -> bool {
         self.device.info().kind == "cpu"

@@ -2,12 +2,13 @@
 
 // ORDER: 140
 
-use afterlight_graph::{BufferHandle, DepthTest, Graph, ImageHandle, Load, RasterPass, gpu::vk};
+use afterlight_graph::{BufferHandle, ComputePass, DepthTest, Graph, ImageHandle, Load, RasterPass, gpu::vk};
 
 use crate::{
     ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, ParamInfo, ParamKind, Params, Source, Technique,
     TechniqueError, compute_raster,
     cost::{self, Cost, Workload},
+    dais_multirate::LowRate,
     geometry::Surfaces,
     multisample::{self, NO_TRIANGLE_RGBA8, Visible},
     triangle_buffer,
@@ -19,7 +20,8 @@ pub static TECHNIQUE: Dais = Dais;
 /// See the module.
 pub struct Dais;
 
-const FILL: ParamInfo = ParamInfo {
+/// Who fills the triangle buffer.
+pub(crate) const FILL: ParamInfo = ParamInfo {
     key: "fill",
     summary: "who fills the triangle buffer: compute over a finished visibility buffer, or fragments through a memoization cache after a depth pre-pass (the paper's)",
     kind: ParamKind::Choice { values: &["resolve", "cache"] },
@@ -118,40 +120,76 @@ impl Technique for Dais {
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
-        if frame.params.text(&INFO, FILL.key) == "cache" {
-            return record_cached(graph, frame);
-        }
-        let visible = Visible::find(graph, frame, &INFO, frame.samples)?;
-        let triangles = triangle_buffer::fill(graph, frame, INFO.id, &visible)?;
-        let source = format!("dais{}", visible.tag('-'));
-        let lights = frame.params.text(&INFO, multisample::LIGHTS.key);
-        multisample::shade(graph, frame, INFO.id, (&source, frame.samples), lights, |pass| {
-            visible.bind(frame, pass);
-            triangles.bind(pass);
-        })
+        record(graph, frame, &INFO, None)
     }
+}
+
+/// Declares the passes of `dais` for a technique with its parameters, indirect light at a low rate where one is given.
+///
+/// # Errors
+/// What the device lacks, more triangles than the frame's references tell apart.
+pub(crate) fn record(
+    graph: &mut Graph,
+    frame: &Frame<'_>,
+    info: &'static Info,
+    rate: Option<&LowRate>,
+) -> Result<ImageHandle, TechniqueError> {
+    if frame.params.text(info, FILL.key) == "cache" {
+        return record_cached(graph, frame, info, rate);
+    }
+    let visible = Visible::find(graph, frame, info, frame.samples)?;
+    let triangles = triangle_buffer::fill(graph, frame, info.id, &visible)?;
+    shade(graph, frame, info, rate, &format!("dais{}", visible.tag('-')), |pass| {
+        visible.bind(frame, pass);
+        triangles.bind(pass);
+    })
+}
+
+/// Declares the shading pass by the technique's parameters.
+pub(crate) fn shade(
+    graph: &mut Graph,
+    frame: &Frame<'_>,
+    info: &'static Info,
+    rate: Option<&LowRate>,
+    source: &str,
+    bind: impl FnOnce(&mut ComputePass<'_>),
+) -> Result<ImageHandle, TechniqueError> {
+    let source = format!("{source}{}", rate.map_or("", LowRate::tag));
+    let lights = frame.params.text(info, multisample::LIGHTS.key);
+    multisample::shade(graph, frame, info.id, (&source, frame.samples), lights, |pass| {
+        if let Some(rate) = rate {
+            rate.constants(pass);
+        }
+        bind(pass);
+    })
 }
 
 /// The paper's pipeline (Figure 3): depth, then fragments that store their triangles through the memoization cache and write
 /// references, then derivatives, then Listing 1.
-fn record_cached(graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
+fn record_cached(
+    graph: &mut Graph,
+    frame: &Frame<'_>,
+    info: &'static Info,
+    rate: Option<&LowRate>,
+) -> Result<ImageHandle, TechniqueError> {
     if !frame.features().post_depth_coverage {
         return Err(TechniqueError::Unavailable {
-            technique: INFO.id,
+            technique: info.id,
             missing: "post-depth coverage for fill=cache (fill=resolve does without)".to_owned(),
         });
     }
     if frame.samples > COVERAGE_SAMPLES_MAX {
         return Err(TechniqueError::Conflict {
-            technique: INFO.id,
+            technique: info.id,
             found: format!("fill=cache with {} samples", frame.samples),
             expected: format!("at most {COVERAGE_SAMPLES_MAX} samples, or fill=resolve"),
         });
     }
-    let references = graph.image("dais/references", frame.multisampled_info(vk::Format::R8G8B8A8_UNORM));
-    let depth = graph.image("dais/depth", frame.multisampled_info(vk::Format::D32_SFLOAT));
-    let cache = Cache::new(graph, frame, &INFO);
-    let list = triangle_buffer::List::new(graph, frame, INFO.id, REFERENCES_MAX)?;
+    let name = |part: &str| format!("{}/{part}", info.id);
+    let references = graph.image(&name("references"), frame.multisampled_info(vk::Format::R8G8B8A8_UNORM));
+    let depth = graph.image(&name("depth"), frame.multisampled_info(vk::Format::D32_SFLOAT));
+    let cache = Cache::new(graph, frame, info);
+    let list = triangle_buffer::List::new(graph, frame, info.id, REFERENCES_MAX)?;
     let depth_only = Surfaces::depth_only(frame)?;
     let mut fill = Surfaces::new(
         frame,
@@ -161,13 +199,13 @@ fn record_cached(graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, Te
     .depth(DepthTest::EQUAL);
     fill.constants = cache.constants(&list);
 
-    let mut pass = graph.raster("dais/depth");
+    let mut pass = graph.raster(&name("depth"));
     frame.bind_scene(&mut pass);
     let depth = pass.depth(depth, Load::Clear(0.0));
     depth_only.draw(frame, &mut pass);
     pass.finish();
 
-    let mut pass = graph.raster("dais/fill");
+    let mut pass = graph.raster(&name("fill"));
     frame.bind_scene(&mut pass);
     let references = pass.color(references, Load::Clear(NO_TRIANGLE_RGBA8));
     pass.depth_read_only(&depth);
@@ -176,11 +214,9 @@ fn record_cached(graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, Te
     fill.draw(frame, &mut pass);
     pass.finish();
 
-    let triangles = list.derivatives(graph, frame, INFO.id)?;
+    let triangles = list.derivatives(graph, frame, info.id)?;
     let visible = Visible::Ids { ids: references, depth, samples: frame.samples };
-    let source = format!("dais-refs{}", visible.tag('-'));
-    let lights = frame.params.text(&INFO, multisample::LIGHTS.key);
-    multisample::shade(graph, frame, INFO.id, (&source, frame.samples), lights, |pass| {
+    shade(graph, frame, info, rate, &format!("dais-refs{}", visible.tag('-')), |pass| {
         visible.bind(frame, pass);
         pass.read("TriangleBuffer", &triangles);
     })

@@ -20,38 +20,41 @@ void source_begin(ivec2 pixel) {
     source_background = 0u;
 }
 
-bool source_next(out Surface s, out uint weight) {
+// The next triangle of the pixel, by a name that tells it from others, and its samples.
+bool source_next_triangle(out uint name, out uint weight) {
     weight = 0u;
-    uint id = NO_TRIANGLE;
+    name = NO_TRIANGLE;
     while (weight == 0u && source_mask != 0u) {
 #ifdef REFERENCES
         uint first = 1u << uint(findLSB(source_mask));
-        id = sample_triangle(source_pixel, uint(findLSB(source_mask)));
+        name = sample_triangle(source_pixel, uint(findLSB(source_mask)));
         // Of what the triangle covers, what no triangle before has had.
-        uint same = id == NO_TRIANGLE ? first : (id >> 24 | first) & source_mask;
+        uint same = name == NO_TRIANGLE ? first : (name >> 24 | first) & source_mask;
         source_mask &= ~same;
 #else
         Visible v = take_triangle(source_pixel, source_mask);
-        id = v.id;
+        name = v.id;
         uint same = v.samples;
 #endif
-        if (id == NO_TRIANGLE) {
+        if (name == NO_TRIANGLE) {
             source_background += uint(bitCount(same));
         } else {
             weight = uint(bitCount(same));
         }
     }
-    if (weight == 0u) {
-        return false;
-    }
-    uint material;
 #ifdef REFERENCES
-    uint place = id & 0xffffffu;
-#else
-    uint place = triangle_index(id);
+    name &= 0xffffffu;
 #endif
-    SurfacePoint p = interpolated_point(place, source_pixel, material);
-    MaterialData m = load_material(material);
-    s = surface_at(m, p, base_color_at(m, p).rgb);
-    return true;
+    return weight != 0u;
 }
+
+// A triangle's place in the triangle buffer.
+uint source_place(uint name) {
+#ifdef REFERENCES
+    return name;
+#else
+    return triangle_index(name);
+#endif
+}
+
+#include "triangle_buffer/surface.glsl"

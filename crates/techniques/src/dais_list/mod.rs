@@ -9,6 +9,7 @@ use crate::{
     Technique, TechniqueError,
     cost::{self, Cost, Workload},
     dais::{self, Cache},
+    dais_multirate::{FULL_RATE, LowRate, SHARE},
     depth_prepass::FIRST_FRAGMENT,
     gbuffer_list::{self, NOT_TAKEN},
     geometry::Surfaces,
@@ -54,7 +55,7 @@ static INFO: Info = Info {
         rates_decoupled: "y, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 45.0 },
-    params: &[multisample::LIGHTS, NODES, dais::CACHE_BUCKETS],
+    params: &[multisample::LIGHTS, NODES, dais::CACHE_BUCKETS, FULL_RATE, SHARE],
     needs: &[Need { name: "post-depth coverage", test: |features| features.post_depth_coverage }],
     samples: MULTIPLE_SAMPLES,
     tessellation: false,
@@ -124,8 +125,8 @@ impl Technique for DaisList {
 
         let triangles = list.derivatives(graph, frame, INFO.id)?;
         frame.watch(graph, "nodes", &node_count, capacity, fixed.is_some());
-        let lights = frame.params.text(&INFO, multisample::LIGHTS.key);
-        multisample::shade(graph, frame, INFO.id, ("dais-nodes", frame.samples), lights, |pass| {
+        let rate = LowRate::chosen(frame, &INFO)?;
+        dais::shade(graph, frame, &INFO, rate.as_ref(), "dais-nodes", |pass| {
             pass.read("gbuffer_depth", &depth).read("Heads", &heads).read("Nodes", &nodes);
             pass.read("TriangleBuffer", &triangles);
         })

@@ -20,26 +20,30 @@ void source_begin(ivec2 pixel) {
     source_background = 0u;
 }
 
-bool source_next(out Surface s, out uint weight) {
+// The next triangle of the pixel, by its place in the triangle buffer, and its samples.
+bool source_next_triangle(out uint name, out uint weight) {
+    weight = 0u;
     if (source_link == 0u) {
         // Samples that were dropped for want of nodes are not the background: the depth buffer tells.
         source_background = source_sum < SAMPLES ? samples_without_surface(source_pixel) : 0u;
         return false;
     }
-    uint place = source_link & 0x7fffffffu;
+    name = source_link & 0x7fffffffu;
     weight = SAMPLES;
     if ((source_link & 0x80000000u) != 0u) {
         source_link = 0u;
     } else {
         uvec2 node = nodes[source_link - 1u];
-        place = node.x & 0xfffffffu;
+        name = node.x & 0xfffffffu;
         weight = (node.x >> 28) + 1u;
         source_link = node.y;
     }
     source_sum += weight;
-    uint material;
-    SurfacePoint p = interpolated_point(place, source_pixel, material);
-    MaterialData m = load_material(material);
-    s = surface_at(m, p, base_color_at(m, p).rgb);
     return true;
 }
+
+uint source_place(uint name) {
+    return name;
+}
+
+#include "triangle_buffer/surface.glsl"

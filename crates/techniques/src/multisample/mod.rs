@@ -185,7 +185,7 @@ pub fn shade(
     }
     bind(&mut pass);
     let radiance = pass.write("hdr", radiance);
-    pass.dispatch(frame.groups(if tiled { 16 } else { 8 }));
+    pass.dispatch(frame.groups(shader.reflection.local_size[0]));
     pass.finish();
     Ok(radiance)
 }

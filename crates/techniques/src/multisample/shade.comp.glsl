@@ -1,11 +1,14 @@
 // Shade and resolve, one thread a pixel: every surface that the source holds once, by all lights or, with LIGHTS_TILED, by
-// those of the pixel's tile.
+// those of the pixel's tile; LOW_RATE: with irradiance that pixels share.
 //
-// In: the source's images or buffers, gbuffer_depth. Out: hdr, RGBA16F, radiance. Dispatch: 8x8 groups; tiled 16x16.
+// In: the source's images or buffers, gbuffer_depth. Out: hdr, RGBA16F, radiance. Dispatch: 8x8 groups; tiled, and at a low rate
+// without quads, 16x16.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #ifdef LIGHTS_TILED
 #include "tiled_shading.glsl"
+#elif defined(LOW_RATE) && !defined(LOW_RATE_QUADS)
+layout(local_size_x = 16, local_size_y = 16) in;
 #else
 layout(local_size_x = 8, local_size_y = 8) in;
 #endif
@@ -28,8 +31,15 @@ bool distance_range(ivec2 pixel, out float nearest_m, out float farthest_m) {
 #endif
 
 void main() {
+#ifdef LOW_RATE
+    ivec2 pixel = invocation_pixel();
+#else
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
-    bool inside = all(lessThan(gl_GlobalInvocationID.xy, frame.size_px));
+#endif
+    bool inside = all(lessThan(uvec2(pixel), frame.size_px));
+#ifdef LOW_RATE
+    low_rate_fill(pixel, inside);
+#endif
     vec3 radiance = vec3(0.0);
     Surface s;
     uint weight;

@@ -47,12 +47,13 @@ vec4 tangent_from_changes(vec3 normal_ws, vec3 dp_dx, vec3 dp_dy, TextureCoordin
     return vec4(tangent, dot(cross(n, tangent), along_v) < 0.0 ? 1.0 : -1.0);
 }
 
-SurfacePoint interpolated_point(uint index, ivec2 pixel, out uint material) {
+// `pixel` is a place in pixels, whole at pixel centres.
+SurfacePoint interpolated_point(uint index, vec2 pixel, out uint material) {
     // In a frame that has more triangles than room, which is recorded again, those without a place show the last.
     uint record = min(index, uint(triangle_buffer.length()) / RECORD_WORDS - 1u) * RECORD_WORDS;
     uint packed_anchor = triangle_buffer[record + 19u];
-    vec2 from_anchor = vec2(pixel - ivec2(packed_anchor & 0xffffu, packed_anchor >> 16));
-    vec2 center = vec2(pixel) + 0.5;
+    vec2 from_anchor = pixel - vec2(packed_anchor & 0xffffu, packed_anchor >> 16);
+    vec2 center = pixel + 0.5;
     vec3 first_words = record_affine(record, from_anchor);
     bool orthographic = frame.eye_ws.w == 0.0;
     vec3 inverse_w = orthographic ? vec3(1.0, 0.0, 0.0) : first_words;
