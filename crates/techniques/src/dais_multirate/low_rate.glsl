@@ -1,130 +1,75 @@
 // Irradiance at a lower rate than a pixel (Schied and Dachsbacher 2015, section 4.4): neighbouring pixels that show the same
 // triangle share one shading sample. A group finds, evaluates and reads its shading samples in shared memory: the paper's
 // visibility buffer of shading samples, their records and a pass of their own are not needed, since the visibility buffer is finished
-// and all that can share a sample stand in one group. Results are LogLuv, 32 bits.
+// and all that can share a sample stand in one group.
 //
 // What is shared is the irradiance, not the radiance: the material stays at full rate.
 //
 // Two ways to find what shares a sample:
-//   LOW_RATE_QUADS  as the paper for rate 1/2: the four lanes of a quad ask each other; where all four show the triangle, one
-//                   sample stands at the quad's centre, else each pixel has its own.
+//   LOW_RATE_QUADS  rate 1/2: the four lanes of a quad ask each other. Where one triangle fills all four pixels, they gather a quarter
+//                   each, for the mean of their places and normals; else each pixel gathers for itself. Nothing is stored.
 //   else            the shading grid (Ragan-Kelley et al. 2011) with a memoization table: a sample for each triangle of a cell of
 //                   CELL_PX x CELL_PX pixels, at the mean of the pixels that show it. Where all do that is the cell's centre; where
-//                   few do it is still among them, so that nothing is extrapolated off the triangle.
+//                   few do it is still among them, so that nothing is extrapolated off the triangle. Results are LogLuv.
 //
 // Both give the same image whatever order threads run in. Needs a source of triangles and shading.glsl.
 #ifndef AFTERLIGHT_LOW_RATE
 #define AFTERLIGHT_LOW_RATE
-#include "logluv.glsl"
-
-const uint GROUP_THREADS = gl_WorkGroupSize.x * gl_WorkGroupSize.y;
-
-// What of a surface irradiance needs. `pixel` is a place in pixels, whole at pixel centres; normal maps are read as wide as the
-// pixels that share the sample.
-Surface receiver(uint place, vec2 pixel, float width_px) {
-    uint material;
-    SurfacePoint p = interpolated_point(place, pixel, material);
-    p.uv0.ddx *= width_px;
-    p.uv0.ddy *= width_px;
-    p.uv1.ddx *= width_px;
-    p.uv1.ddy *= width_px;
-    Surface s;
-    s.position_ws = p.position_ws;
-    s.normal_ws = mapped_normal(load_material(material), p);
-    return s;
-}
 
 #ifdef LOW_RATE_QUADS
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_quad : require
 
-// Names and irradiances of the samples that a quad shares: at most as many as a pixel has triangles.
-shared uint quad_names[GROUP_THREADS / 4u * SAMPLES];
-shared uint quad_irradiance[GROUP_THREADS / 4u * SAMPLES];
+bool quad_is_whole;     // one triangle fills the four pixels
 
 // Lanes of four pixels that stand together, whatever the subgroup's size.
-uint lane_in_group() {
-    return gl_SubgroupID * gl_SubgroupSize + gl_SubgroupInvocationID;
-}
-
 ivec2 invocation_pixel() {
-    uint lane = lane_in_group(), quad = lane / 4u, quads_a_row = gl_WorkGroupSize.x / 2u;
+    uint lane = gl_SubgroupID * gl_SubgroupSize + gl_SubgroupInvocationID;
+    uint quad = lane / 4u, quads_a_row = gl_WorkGroupSize.x / 2u;
     uvec2 corner = uvec2(quad % quads_a_row, quad / quads_a_row) * 2u;
     return ivec2(gl_WorkGroupID.xy * gl_WorkGroupSize.xy + corner + uvec2(lane & 1u, lane >> 1 & 1u));
 }
 
-uint quad_first_slot() {
-    return lane_in_group() / 4u * SAMPLES;
+vec3 quad_sum(vec3 v) {
+    v += subgroupQuadSwapHorizontal(v);
+    return v + subgroupQuadSwapVertical(v);
 }
 
-bool shows_triangle(ivec2 pixel, uint name) {
-    source_begin(pixel);
-    uint other, weight;
-    while (source_next_triangle(other, weight)) {
-        if (other == name) {
-            return true;
-        }
-    }
-    return false;
-}
-
-bool in_whole_quad(bool lane) {
-    uint rows = uint(lane) & subgroupQuadSwapHorizontal(uint(lane));
-    return (rows & subgroupQuadSwapVertical(rows)) != 0u;
-}
-
-// Evaluates what the quads of the group share: a quarter of the gathering a lane. Every thread calls it once.
+// Finds out whether the quad shares a sample. Every thread calls it once.
 void low_rate_fill(ivec2 pixel, bool inside) {
-    uint lane = lane_in_group() & 3u, first = quad_first_slot(), shared_count = 0u;
-    for (uint i = lane; i < SAMPLES; i += 4u) {
-        quad_names[first + i] = NO_TRIANGLE;
+    uint name = NO_TRIANGLE, weight = 0u;
+    if (inside) {
+        source_begin(pixel);
+        name = source_next_triangle(name, weight) && weight == SAMPLES ? name : NO_TRIANGLE;
     }
-    barrier();
-    source_begin(pixel);
-    for (;;) {
-        // Triangles of the upper left pixel: no other can be in all four.
-        uint name = NO_TRIANGLE, weight;
-        if (lane == 0u && inside && !source_next_triangle(name, weight)) {
-            name = NO_TRIANGLE;
-        }
-        name = subgroupQuadBroadcast(name, 0u);
-        if (name == NO_TRIANGLE) {
-            break;
-        }
-        if (!in_whole_quad(inside && (lane == 0u || shows_triangle(pixel, name)))) {
-            continue;
-        }
-        Surface s = receiver(source_place(name), vec2(pixel & ~1) + 0.5, 2.0);
-        uint quarter = INDIRECT_SAMPLES / 4u;
-        vec3 sum = gathered_irradiance(s, lane * quarter, (lane + 1u) * quarter);
-        sum += subgroupQuadSwapHorizontal(sum);
-        sum += subgroupQuadSwapVertical(sum);
-        if (lane == 0u) {
-            quad_names[first + shared_count] = name;
-            quad_irradiance[first + shared_count] = logluv_encode(sum);
-        }
-        ++shared_count;
-    }
-    barrier();
+    // A name may be any number but NO_TRIANGLE: equal across both swaps is equal in all four.
+    uint across = subgroupQuadSwapHorizontal(name);
+    uint same = uint(name == across && name != NO_TRIANGLE && name == subgroupQuadSwapVertical(name));
+    quad_is_whole = (same & subgroupQuadSwapHorizontal(same)) != 0u;
 }
 
-// Irradiance of a triangle in a pixel: what its quad shares, else its own.
+// Irradiance of a triangle in a pixel: where it fills the quad all four lanes are here, since what it takes to come here is of the
+// triangle.
 vec3 irradiance_of(ivec2 pixel, uint name, Surface s) {
-    uint first = quad_first_slot();
-    for (uint slot = first; slot < first + SAMPLES && quad_names[slot] != NO_TRIANGLE; ++slot) {
-        if (quad_names[slot] == name) {
-            return logluv_decode(quad_irradiance[slot]);
-        }
+    if (!quad_is_whole) {
+        return gathered_irradiance(s, 0u, INDIRECT_SAMPLES);
     }
-    return gathered_irradiance(s, 0u, INDIRECT_SAMPLES);
+    Surface mean = s;
+    mean.position_ws = 0.25 * quad_sum(s.position_ws);
+    mean.normal_ws = unit_or_zero(quad_sum(s.normal_ws));
+    uint quarter = INDIRECT_SAMPLES / 4u, first = (gl_SubgroupInvocationID & 3u) * quarter;
+    return quad_sum(gathered_irradiance(mean, first, first + quarter));
 }
 
 #else
+#include "logluv.glsl"
 
 // Width of a cell, pixels: 1, 2, 4 or 8.
 layout(constant_id = 12) const uint CELL_PX = 2u;
 
-const uint TILE_PX = 16u;
+const uint TILE_PX = gl_WorkGroupSize.x;
+const uint GROUP_THREADS = TILE_PX * TILE_PX;
+
 // Triangles that can show in a tile, cell by cell: the table cannot overflow.
 const uint SLOTS = TILE_PX * TILE_PX * SAMPLES;
 const uint SLOTS_A_CELL = SLOTS / (TILE_PX / CELL_PX * (TILE_PX / CELL_PX));
@@ -174,6 +119,21 @@ void add_shading_samples(ivec2 pixel) {
     }
 }
 
+// What of a surface irradiance needs. `pixel` is a place in pixels, whole at pixel centres; normal maps are read as wide as the
+// pixels that share the sample.
+Surface receiver(uint place, vec2 pixel, float width_px) {
+    uint material;
+    SurfacePoint p = interpolated_point(place, pixel, material);
+    p.uv0.ddx *= width_px;
+    p.uv0.ddy *= width_px;
+    p.uv1.ddx *= width_px;
+    p.uv1.ddy *= width_px;
+    Surface s;
+    s.position_ws = p.position_ws;
+    s.normal_ws = mapped_normal(load_material(material), p);
+    return s;
+}
+
 // Part of the irradiance of a slot's triangle, where the pixels that show it stand in the mean.
 vec3 slot_irradiance(uint slot, uint first_sample, uint end_sample) {
     uint cells_a_row = TILE_PX / CELL_PX, cell = slot / SLOTS_A_CELL, sums = grid_values[slot];
@@ -200,9 +160,12 @@ void low_rate_fill(ivec2 pixel, bool inside) {
         add_shading_samples(pixel);
     }
     barrier();
-    // A few samples at once and several threads each: a tile has about as many as it has cells.
-    uint used = grid_used_count;
-    uint at_once = used <= 16u ? 16u : 64u, parts = GROUP_THREADS / at_once;
+    // A few samples at once and at least four threads each: a tile has about as many as it has cells.
+    uint used = grid_used_count, at_once = 4u;
+    while (at_once < used && at_once < GROUP_THREADS / 4u) {
+        at_once *= 2u;
+    }
+    uint parts = GROUP_THREADS / at_once;
     uint part = thread / at_once, share = INDIRECT_SAMPLES / parts;
     for (uint first = 0u; first < used; first += at_once) {
         uint mine = first + thread % at_once;

@@ -47,9 +47,10 @@ fn has_quads(features: &gpu::Features) -> bool {
         && features.subgroup_stages.contains(ShaderStageFlags::COMPUTE)
 }
 
-/// Bytes of shared memory that the shading grid of a tile takes, and its lights' bits.
-fn grid_bytes(samples: u32) -> u32 {
-    256 * (3 * 4 * samples + 12) + 256
+/// Bytes of shared memory that the shading grid of a group takes: three words for each triangle that may show, three floats a
+/// thread, and some.
+fn grid_bytes(threads: u32, samples: u32) -> u32 {
+    threads * (12 * samples + 12) + 256
 }
 
 /// Indirect light at a low rate: which of `low_rate.glsl`.
@@ -78,12 +79,15 @@ impl LowRate {
         if cell_px == 1 || !frame.has_indirect_light() {
             return Ok(None);
         }
-        let unavailable =
-            |missing: String| Err(TechniqueError::Unavailable { technique: info.id, missing });
+        let unavailable = |missing: String| Err(TechniqueError::Unavailable { technique: info.id, missing });
         if quads && !has_quads(frame.features()) {
-            return unavailable("subgroup quad operations for share=quads (share=grid does without)".to_owned());
+            return unavailable(
+                "subgroup quad operations for share=quads (share=grid does without)".to_owned(),
+            );
         }
-        let (needed, there) = (grid_bytes(frame.samples), frame.features().max_shared_memory_bytes);
+        let threads = if frame.params.text(info, multisample::LIGHTS.key) == "tiled" { 256 } else { 64 };
+        let needed = grid_bytes(threads, frame.samples);
+        let there = frame.features().max_shared_memory_bytes;
         if !quads && needed > there {
             return unavailable(format!(
                 "{needed} bytes of shared memory for share=grid at {} samples (there are {there})",

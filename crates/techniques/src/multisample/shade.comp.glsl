@@ -1,14 +1,11 @@
 // Shade and resolve, one thread a pixel: every surface that the source holds once, by all lights or, with LIGHTS_TILED, by
 // those of the pixel's tile; LOW_RATE: with irradiance that pixels share.
 //
-// In: the source's images or buffers, gbuffer_depth. Out: hdr, RGBA16F, radiance. Dispatch: 8x8 groups; tiled, and at a low rate
-// without quads, 16x16.
+// In: the source's images or buffers, gbuffer_depth. Out: hdr, RGBA16F, radiance. Dispatch: 8x8 groups; tiled 16x16.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #ifdef LIGHTS_TILED
 #include "tiled_shading.glsl"
-#elif defined(LOW_RATE) && !defined(LOW_RATE_QUADS)
-layout(local_size_x = 16, local_size_y = 16) in;
 #else
 layout(local_size_x = 8, local_size_y = 8) in;
 #endif
