@@ -27,9 +27,13 @@ const CACHE: &[(&str, &str)] = &[("fill", "cache")];
 fn ways(samples: u32) -> Vec<Way> {
     let way = |sets, full, bound| Way { id: "dais-multirate", sets, full: ("dais", full), bound };
     let mut ways = vec![
-        way(RASTER, RASTER, HALF_RATE_BOUND),
-        way(&[("visibility", "compute"), ("lights", "tiled")], COMPUTE, HALF_RATE_BOUND),
-        way(CACHE, CACHE, HALF_RATE_BOUND),
+        way(&[("visibility", "raster"), ("share", "grid")], RASTER, HALF_RATE_BOUND),
+        way(
+            &[("visibility", "compute"), ("share", "grid"), ("lights", "tiled")],
+            COMPUTE,
+            HALF_RATE_BOUND,
+        ),
+        way(&[("fill", "cache"), ("share", "grid")], CACHE, HALF_RATE_BOUND),
         way(&[("visibility", "raster"), ("share", "quads")], RASTER, HALF_RATE_BOUND),
         way(&[("visibility", "compute"), ("share", "quads")], COMPUTE, HALF_RATE_BOUND),
         way(&[("fill", "cache"), ("share", "quads"), ("lights", "tiled")], CACHE, HALF_RATE_BOUND),
@@ -38,7 +42,7 @@ fn ways(samples: u32) -> Vec<Way> {
     ];
     if samples > 1 {
         let list = |sets| Way { id: "dais-list", sets, full: ("dais-list", &[]), bound: HALF_RATE_BOUND };
-        ways.push(list(&[("rate", "1/2")]));
+        ways.push(list(&[("rate", "1/2"), ("share", "grid")]));
         ways.push(list(&[("rate", "1/2"), ("share", "quads")]));
     }
     ways

@@ -23,6 +23,7 @@ void source_begin(ivec2 pixel) {
 // The next triangle of the pixel, by its place in the triangle buffer, and its samples.
 bool source_next_triangle(out uint name, out uint weight) {
     weight = 0u;
+    name = NO_TRIANGLE;
     if (source_link == 0u) {
         // Samples that were dropped for want of nodes are not the background: the depth buffer tells.
         source_background = source_sum < SAMPLES ? samples_without_surface(source_pixel) : 0u;

@@ -35,31 +35,33 @@ vec3 quad_sum(vec3 v) {
     return v + subgroupQuadSwapVertical(v);
 }
 
-// Finds out whether the quad shares a sample. Every thread calls it once.
-void low_rate_fill(ivec2 pixel, bool inside) {
-    uint name = NO_TRIANGLE, weight = 0u;
-    if (inside) {
-        source_begin(pixel);
-        name = source_next_triangle(name, weight) && weight == SAMPLES ? name : NO_TRIANGLE;
-    }
-    // A name may be any number but NO_TRIANGLE: equal across both swaps is equal in all four.
-    uint across = subgroupQuadSwapHorizontal(name);
-    uint same = uint(name == across && name != NO_TRIANGLE && name == subgroupQuadSwapVertical(name));
-    quad_is_whole = (same & subgroupQuadSwapHorizontal(same)) != 0u;
+// Finds out whether the quad shares a sample, of the triangle that each lane has come to. A triangle that fills its pixel is the
+// pixel's first and last, so that where it fills four the lanes are here together; what others swap is not looked at.
+void low_rate_next(ivec2 pixel, uint name, uint weight) {
+    bool quad_inside = all(lessThan(uvec2(pixel | 1), frame.size_px));
+    uint mine = weight == SAMPLES && quad_inside ? name : NO_TRIANGLE;
+    uint same = uint(mine != NO_TRIANGLE && mine == subgroupQuadSwapHorizontal(mine));
+    same &= uint(mine == subgroupQuadSwapVertical(mine));
+    quad_is_whole = (same & subgroupQuadSwapHorizontal(same)) != 0u && mine != NO_TRIANGLE;
 }
 
-// Irradiance of a triangle in a pixel: where it fills the quad all four lanes are here, since what it takes to come here is of the
-// triangle.
+// Irradiance of a triangle in a pixel. Lanes of whole quads gather a quarter, others all: one loop, so that a subgroup of both
+// takes no longer than the others alone.
 vec3 irradiance_of(ivec2 pixel, uint name, Surface s) {
-    if (!quad_is_whole) {
-        return gathered_irradiance(s, 0u, INDIRECT_SAMPLES);
+    uint first = 0u, end = INDIRECT_SAMPLES;
+    if (quad_is_whole) {
+        s.position_ws = 0.25 * quad_sum(s.position_ws);
+        s.normal_ws = unit_or_zero(quad_sum(s.normal_ws));
+        uint quarter = INDIRECT_SAMPLES / 4u;
+        first = (gl_SubgroupInvocationID & 3u) * quarter;
+        end = first + quarter;
     }
-    Surface mean = s;
-    mean.position_ws = 0.25 * quad_sum(s.position_ws);
-    mean.normal_ws = unit_or_zero(quad_sum(s.normal_ws));
-    uint quarter = INDIRECT_SAMPLES / 4u, first = (gl_SubgroupInvocationID & 3u) * quarter;
-    return quad_sum(gathered_irradiance(mean, first, first + quarter));
+    vec3 irradiance = gathered_irradiance(s, first, end);
+    return quad_is_whole ? quad_sum(irradiance) : irradiance;
 }
+
+// Nothing is found before.
+void low_rate_fill(ivec2 pixel, bool inside) {}
 
 #else
 #include "logluv.glsl"
@@ -182,6 +184,9 @@ void low_rate_fill(ivec2 pixel, bool inside) {
         barrier();
     }
 }
+
+// Nothing to find out.
+void low_rate_next(ivec2 pixel, uint name, uint weight) {}
 
 // Irradiance of a triangle in a pixel.
 vec3 irradiance_of(ivec2 pixel, uint name, Surface s) {

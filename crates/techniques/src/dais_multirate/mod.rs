@@ -35,9 +35,9 @@ pub(crate) const FULL_RATE: ParamInfo = ParamInfo { default: "1", ..RATE };
 /// How pixels find whom they share a sample with.
 pub(crate) const SHARE: ParamInfo = ParamInfo {
     key: "share",
-    summary: "who shares a shading sample: pixels of a cell of the shading grid, by a memoization table, or whole quads, by subgroup quad operations (rate 1/2 alone)",
-    kind: ParamKind::Choice { values: &["grid", "quads"] },
-    default: "grid",
+    summary: "who shares a shading sample: pixels of a cell of the shading grid, by a memoization table, or quads that one triangle fills, by subgroup quad operations (rate 1/2 alone); auto: quads where there can be",
+    kind: ParamKind::Choice { values: &["auto", "grid", "quads"] },
+    default: "auto",
 };
 
 /// Subgroup quad operations in compute shaders.
@@ -68,7 +68,10 @@ impl LowRate {
     pub fn chosen(frame: &Frame<'_>, info: &'static Info) -> Result<Option<Self>, TechniqueError> {
         let rate = frame.params.text(info, RATE.key);
         let cell_px: u32 = rate.rsplit('/').next().and_then(|n| n.parse().ok()).unwrap_or(1);
-        let quads = frame.params.text(info, SHARE.key) == "quads";
+        let quads = match frame.params.text(info, SHARE.key) {
+            "auto" => cell_px == 2 && has_quads(frame.features()),
+            share => share == "quads",
+        };
         if quads && cell_px != 2 {
             return Err(TechniqueError::Conflict {
                 technique: info.id,

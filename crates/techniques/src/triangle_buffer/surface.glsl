@@ -16,7 +16,11 @@ Surface surface_of_triangle(uint place, vec2 pixel) {
 
 bool source_next(out Surface s, out uint weight) {
     uint name;
-    if (!source_next_triangle(name, weight)) {
+    bool found = source_next_triangle(name, weight);
+#ifdef LOW_RATE
+    low_rate_next(source_pixel, name, weight);
+#endif
+    if (!found) {
         return false;
     }
     s = surface_of_triangle(source_place(name), vec2(source_pixel));
