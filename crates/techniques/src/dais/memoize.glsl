@@ -1,6 +1,7 @@
 // The memoization cache: triangle to its place in the triangle buffer (Schied and Dachsbacher 2015, section 4.1; Liktor and
 // Dachsbacher 2012). Every fragment looks its triangle up; one that finds nothing takes the bucket's lock, a slot of the
-// triangle buffer, and stores the triangle: its ID in the first word of its record, for the derivative pass.
+// triangle buffer, and stores the triangle for the derivative pass: its ID in the first word of its record, or, with
+// WHOLE_TRIANGLE, whose IDs are numbers that lead nowhere, its vertices in the record. Needs draw_material.
 //
 // No lock can hang. A fragment that fails to take a lock does not wait inside the loop's turn but polls again, at most POLLS times;
 // one that takes it lets go within the same turn, whatever the other lanes of its subgroup do. After that the triangle is
@@ -8,6 +9,10 @@
 #ifndef AFTERLIGHT_MEMOIZE
 #define AFTERLIGHT_MEMOIZE
 #include "triangle_buffer/record.glsl"
+#ifdef WHOLE_TRIANGLE
+#define THROUGH in
+#include "geometry/whole_triangle.glsl"
+#endif
 
 // Triangle ID and its place, two entries a bucket. Written place first, ID last; an ID that is being replaced is none. Volatile:
 // a look-up reads the ID twice, and a compiler that joins the reads takes another triangle's place (32 dB on lavapipe).
@@ -51,10 +56,41 @@ uint look_up(uint bucket, uint id) {
     return NOT_CACHED;
 }
 
+#ifdef WHOLE_TRIANGLE
+void store_float(uint word, float value) {
+    triangle_buffer[word] = floatBitsToUint(value);
+}
+
+// The layout of triangle_buffer/vertices.glsl.
+void store_vertices(uint record) {
+    for (uint i = 0u; i < 3u; ++i) {
+        for (uint c = 0u; c < 3u; ++c) {
+            store_float(record + 3u * i + c, vertex_position_ws[i][c]);
+        }
+        triangle_buffer[record + 9u + i] = vertex_normals[i];
+        for (uint c = 0u; c < 2u; ++c) {
+            store_float(record + 12u + 2u * i + c, vertex_uv0_uv1[i][c]);
+            if (HAS_UV1 != 0u) {
+                store_float(record + UV1_WORD + 2u * i + c, vertex_uv0_uv1[i][2u + c]);
+            }
+        }
+        for (uint c = 0u; HAS_VERTEX_COLOR != 0u && c < 4u; ++c) {
+            store_float(record + COLOR_WORD + 4u * i + c, vertex_color[i][c]);
+        }
+    }
+    triangle_buffer[record + 18u] = draw_material.y | (gl_FrontFacing ? RECORD_FRONT : 0u);
+    triangle_buffer[record + 19u] = vertex_normals.w;
+}
+#endif
+
 uint store_triangle(uint id) {
     uint place = atomicAdd(triangles_needed, 1u);
     if (place < TRIANGLE_CAPACITY) {
+#ifdef WHOLE_TRIANGLE
+        store_vertices(place * RECORD_WORDS);
+#else
         triangle_buffer[place * RECORD_WORDS] = id;
+#endif
     } else {
         atomicAdd(triangles_dropped, 1u);
     }
@@ -92,6 +128,15 @@ uint memoized(uint id) {
         }
     }
     return store_triangle(id);
+}
+
+// What tells the fragment's triangle from others.
+uint fragment_triangle() {
+#ifdef WHOLE_TRIANGLE
+    return uint(gl_PrimitiveID);
+#else
+    return draw_material.x << TRIANGLE_BITS | uint(gl_PrimitiveID);
+#endif
 }
 
 #endif

@@ -2,14 +2,17 @@
 
 // ORDER: 140
 
-use afterlight_graph::{BufferHandle, ComputePass, DepthTest, Graph, ImageHandle, Load, RasterPass, gpu::vk};
+mod passes;
+
+pub(crate) use passes::ScenePasses;
+
+use afterlight_graph::{BufferHandle, ComputePass, Graph, ImageHandle, Load, RasterPass, gpu::vk};
 
 use crate::{
     ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, ParamInfo, ParamKind, Params, Source, Technique,
     TechniqueError, compute_raster,
     cost::{self, Cost, Workload},
     dais_multirate::LowRate,
-    geometry::Surfaces,
     multisample::{self, NO_TRIANGLE_RGBA8, Visible},
     triangle_buffer,
 };
@@ -23,9 +26,16 @@ pub struct Dais;
 /// Who fills the triangle buffer.
 pub(crate) const FILL: ParamInfo = ParamInfo {
     key: "fill",
-    summary: "who fills the triangle buffer: compute over a finished visibility buffer, or fragments through a memoization cache after a depth pre-pass (the paper's)",
-    kind: ParamKind::Choice { values: &["resolve", "cache"] },
-    default: "resolve",
+    summary: "who fills the triangle buffer: compute over a finished visibility buffer, or fragments through a memoization cache after a depth pre-pass (the paper's); auto: compute, fragments where surfaces are tessellated",
+    kind: ParamKind::Choice { values: &["auto", "resolve", "cache"] },
+    default: "auto",
+};
+/// How many triangles samples tell apart that hold coverage as well.
+const REFERENCE_BITS: ParamInfo = ParamInfo {
+    key: "reference-bits",
+    summary: "fill=cache: bits of the reference in a visibility sample that holds coverage as well; where triangles need more, samples hold 32 bits of reference and no coverage",
+    kind: ParamKind::Integer { min: 8, max: 24 },
+    default: "24",
 };
 /// Size of the memoization cache.
 pub(crate) const CACHE_BUCKETS: ParamInfo = ParamInfo {
@@ -35,8 +45,8 @@ pub(crate) const CACHE_BUCKETS: ParamInfo = ParamInfo {
     default: "8192",
 };
 
-/// Most triangles that a visibility sample's 24 bits tell apart; all ones with full coverage is the background.
-const REFERENCES_MAX: u32 = (1 << 24) - 2;
+/// Most triangles that a visibility sample's 32 bits tell apart; all ones is the background.
+const REFERENCES_MAX: u32 = u32::MAX - 1;
 /// Most samples of a visibility sample's coverage mask.
 const COVERAGE_SAMPLES_MAX: u32 = 8;
 /// Polls of a locked bucket before a triangle is stored once more. The lock is held for some tens of instructions.
@@ -103,10 +113,17 @@ static INFO: Info = Info {
     },
     // Texture gradients are analytic.
     exactness: Exactness::Exact { min_psnr_db: 45.0 },
-    params: &[multisample::LIGHTS, FILL, CACHE_BUCKETS, compute_raster::VISIBILITY, compute_raster::SMALL],
+    params: &[
+        multisample::LIGHTS,
+        FILL,
+        CACHE_BUCKETS,
+        REFERENCE_BITS,
+        compute_raster::VISIBILITY,
+        compute_raster::SMALL,
+    ],
     needs: &[],
     samples: ANY_SAMPLES,
-    tessellation: false,
+    tessellation: true,
     views: multisample::VIEWS,
 };
 
@@ -134,7 +151,7 @@ pub(crate) fn record(
     info: &'static Info,
     rate: Option<&LowRate>,
 ) -> Result<ImageHandle, TechniqueError> {
-    if frame.params.text(info, FILL.key) == "cache" {
+    if is_cached(frame, info)? {
         return record_cached(graph, frame, info, rate);
     }
     let visible = Visible::find(graph, frame, info, frame.samples)?;
@@ -164,6 +181,43 @@ pub(crate) fn shade(
     })
 }
 
+/// Whether fragments store their triangles through the cache: by [`FILL`], and of tessellated surfaces, whose triangles no index
+/// leads back to, always.
+fn is_cached(frame: &Frame<'_>, info: &Info) -> Result<bool, TechniqueError> {
+    let conflict = |found: &str, expected: &str| {
+        Err(TechniqueError::Conflict {
+            technique: info.id,
+            found: found.to_owned(),
+            expected: expected.to_owned(),
+        })
+    };
+    let tessellated = frame.tessellate_px.is_some();
+    let cached = match frame.params.text(info, FILL.key) {
+        "resolve" if tessellated => {
+            return conflict("fill=resolve with --tessellate", "fill=cache, or auto");
+        }
+        "resolve" => false,
+        "cache" => true,
+        _ => tessellated,
+    };
+    if cached && frame.params.text(info, compute_raster::VISIBILITY.key) == "compute" {
+        let found = "visibility=compute where fragments fill the triangle buffer (fill=cache, --tessellate)";
+        return conflict(found, "visibility=raster, or auto");
+    }
+    Ok(cached)
+}
+
+/// Whether samples hold 32 bits of reference and no coverage: where there are more triangles than fewer bits tell apart, more
+/// samples than a mask has bits, or a device without post-depth coverage.
+fn is_wide(frame: &Frame<'_>, info: &Info) -> bool {
+    let bits = frame.params.number(info, REFERENCE_BITS.key) as u32;
+    // All ones with full coverage is the background; what finds no place is the one before.
+    let narrow_max = (1_u32 << bits).saturating_sub(2);
+    triangle_buffer::capacity(frame) > narrow_max
+        || frame.samples > COVERAGE_SAMPLES_MAX
+        || !frame.features().post_depth_coverage
+}
+
 /// The paper's pipeline (Figure 3): depth, then fragments that store their triangles through the memoization cache and write
 /// references, then derivatives, then Listing 1.
 fn record_cached(
@@ -172,37 +226,21 @@ fn record_cached(
     info: &'static Info,
     rate: Option<&LowRate>,
 ) -> Result<ImageHandle, TechniqueError> {
-    if !frame.features().post_depth_coverage {
-        return Err(TechniqueError::Unavailable {
-            technique: info.id,
-            missing: "post-depth coverage for fill=cache (fill=resolve does without)".to_owned(),
-        });
-    }
-    if frame.samples > COVERAGE_SAMPLES_MAX {
-        return Err(TechniqueError::Conflict {
-            technique: info.id,
-            found: format!("fill=cache with {} samples", frame.samples),
-            expected: format!("at most {COVERAGE_SAMPLES_MAX} samples, or fill=resolve"),
-        });
-    }
+    let wide = is_wide(frame, info);
     let name = |part: &str| format!("{}/{part}", info.id);
-    let references = graph.image(&name("references"), frame.multisampled_info(vk::Format::R8G8B8A8_UNORM));
+    let references = name(if wide { "wide references" } else { "references" });
+    let references = graph.image(&references, frame.multisampled_info(vk::Format::R8G8B8A8_UNORM));
     let depth = graph.image(&name("depth"), frame.multisampled_info(vk::Format::D32_SFLOAT));
     let cache = Cache::new(graph, frame, info);
     let list = triangle_buffer::List::new(graph, frame, info.id, REFERENCES_MAX)?;
-    let depth_only = Surfaces::depth_only(frame)?;
-    let mut fill = Surfaces::new(
-        frame,
-        ("geometry/surface.vert#position", Some("dais/fill.frag")),
-        ("geometry/surface.vert#uv", "dais/fill.frag#mask"),
-    )?
-    .depth(DepthTest::EQUAL);
-    fill.constants = cache.constants(&list);
+    let tags = if wide { &["wide"][..] } else { &[] };
+    let mut passes = ScenePasses::new(graph, frame, info, "dais/fill.frag", tags)?;
+    passes.fill.constants = cache.constants(&list);
 
     let mut pass = graph.raster(&name("depth"));
     frame.bind_scene(&mut pass);
     let depth = pass.depth(depth, Load::Clear(0.0));
-    depth_only.draw(frame, &mut pass);
+    passes.depth.draw(frame, &mut pass);
     pass.finish();
 
     let mut pass = graph.raster(&name("fill"));
@@ -211,12 +249,13 @@ fn record_cached(
     pass.depth_read_only(&depth);
     cache.bind(&mut pass);
     let list = list.written_by(&mut pass);
-    fill.draw(frame, &mut pass);
+    passes.draw_fill(frame, &mut pass);
     pass.finish();
 
     let triangles = list.derivatives(graph, frame, info.id)?;
     let visible = Visible::Ids { ids: references, depth, samples: frame.samples };
-    shade(graph, frame, info, rate, &format!("dais-refs{}", visible.tag('-')), |pass| {
+    let layout = if wide { "wide" } else { "refs" };
+    shade(graph, frame, info, rate, &format!("dais-{layout}{}", visible.tag('-')), |pass| {
         visible.bind(frame, pass);
         pass.read("TriangleBuffer", &triangles);
     })

@@ -1,10 +1,10 @@
 // Surfaces of a pixel from a visibility buffer and the triangle buffer: each triangle once, weighted by its samples (Schied
 // and Dachsbacher 2015, Listing 1).
 //
-// REFERENCES: samples hold 24 bits of reference and 8 bits of coverage, as in the paper. Else they hold a triangle's name alone,
-// and which samples share it is found by comparing them.
+// REFERENCES: samples hold 24 bits of reference and 8 bits of coverage, as in the paper. WIDE_REFERENCES: 32 bits of reference. Else
+// a triangle's name. Where there is no coverage, which samples share a triangle is found by comparing them.
 #include "triangle_buffer/interpolate.glsl"
-#ifndef REFERENCES
+#if !defined(REFERENCES) && !defined(WIDE_REFERENCES)
 #include "triangle_buffer/index.glsl"
 #endif
 #define IDS_BINDING 9
@@ -50,7 +50,7 @@ bool source_next_triangle(out uint name, out uint weight) {
 
 // A triangle's place in the triangle buffer.
 uint source_place(uint name) {
-#ifdef REFERENCES
+#if defined(REFERENCES) || defined(WIDE_REFERENCES)
     return name;
 #else
     return triangle_index(name);

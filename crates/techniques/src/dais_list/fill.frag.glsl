@@ -10,7 +10,6 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_post_depth_coverage : require
 #include "frame.glsl"
-#include "dais/memoize.glsl"
 #include "gbuffer_list/claims.glsl"
 #ifdef ALPHA_MASK
 #define WITH_UV
@@ -18,6 +17,7 @@
 #else
 layout(location = 0) flat in uvec2 draw_material;
 #endif
+#include "dais/memoize.glsl"
 
 layout(early_fragment_tests) in;
 layout(post_depth_coverage) in;
@@ -49,7 +49,7 @@ void main() {
     if (gl_HelperInvocation || mask == 0u) {
         return;
     }
-    uint place = memoized(draw_material.x << TRIANGLE_BITS | uint(gl_PrimitiveID));
+    uint place = memoized(fragment_triangle());
     uint count = uint(bitCount(mask));
     if (count == SAMPLES) {
         heads[head] = DIRECT | place;

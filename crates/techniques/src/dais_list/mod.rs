@@ -2,17 +2,16 @@
 
 // ORDER: 150
 
-use afterlight_graph::{DepthTest, Graph, ImageHandle, Load};
+use afterlight_graph::{Graph, ImageHandle, Load};
 
 use crate::{
     Answers, AppendixA, Exactness, Frame, Info, MULTIPLE_SAMPLES, Need, ParamInfo, ParamKind, Params, Source,
     Technique, TechniqueError,
     cost::{self, Cost, Workload},
-    dais::{self, Cache},
+    dais::{self, Cache, ScenePasses},
     dais_multirate::{FULL_RATE, LowRate, SHARE},
     depth_prepass::FIRST_FRAGMENT,
     gbuffer_list::{self, NOT_TAKEN},
-    geometry::Surfaces,
     multisample, triangle_buffer,
 };
 
@@ -58,7 +57,7 @@ static INFO: Info = Info {
     params: &[multisample::LIGHTS, NODES, dais::CACHE_BUCKETS, FULL_RATE, SHARE],
     needs: &[Need { name: "post-depth coverage", test: |features| features.post_depth_coverage }],
     samples: MULTIPLE_SAMPLES,
-    tessellation: false,
+    tessellation: true,
     views: multisample::VIEWS,
 };
 
@@ -91,14 +90,9 @@ impl Technique for DaisList {
         let claims = gbuffer_list::claims(graph, frame, INFO.id, frame.samples);
         let cache = Cache::new(graph, frame, &INFO);
         let list = triangle_buffer::List::new(graph, frame, INFO.id, REFERENCES_MAX)?;
-        let depth_only = Surfaces::depth_only(frame)?;
-        let mut fill = Surfaces::new(
-            frame,
-            ("geometry/surface.vert#position", Some("dais_list/fill.frag")),
-            ("geometry/surface.vert#uv", "dais_list/fill.frag#mask"),
-        )?
-        .depth(DepthTest::EQUAL)
-        .stencil(FIRST_FRAGMENT, 1);
+        let mut passes = ScenePasses::new(graph, frame, &INFO, "dais_list/fill.frag", &[])?;
+        let fill = &mut passes.fill;
+        (fill.stencil, fill.stencil_reference) = (Some(FIRST_FRAGMENT), 1);
         fill.masked_stencil = Some(NOT_TAKEN);
         fill.constants = cache.constants(&list);
         fill.constants.push(("SAMPLES".to_owned(), frame.samples));
@@ -108,7 +102,7 @@ impl Technique for DaisList {
         frame.bind_scene(&mut pass);
         let depth = pass.depth(depth, Load::Clear(0.0));
         pass.stencil_clear(0);
-        depth_only.draw(frame, &mut pass);
+        passes.depth.draw(frame, &mut pass);
         pass.finish();
 
         let mut pass = graph.raster("dais-list/fill");
@@ -120,7 +114,7 @@ impl Technique for DaisList {
         let _claims = claims.map(|claims| pass.write("SampleClaims", claims));
         cache.bind(&mut pass);
         let list = list.written_by(&mut pass);
-        fill.draw(frame, &mut pass);
+        passes.draw_fill(frame, &mut pass);
         pass.finish();
 
         let triangles = list.derivatives(graph, frame, INFO.id)?;

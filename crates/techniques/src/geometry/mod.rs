@@ -125,22 +125,40 @@ impl Surfaces {
     }
 
     /// Numbers the triangles that tessellation makes in `gl_PrimitiveID`, the full vertex path alone; the counter, zero before
-    /// the pass, is to be bound as `TriangleCount`.
+    /// the pass, is to be bound as `TriangleNumbers`.
     ///
     /// # Errors
     /// A device that counts in no geometry shader.
     pub fn numbered(mut self, frame: &Frame<'_>, technique: &'static str) -> Result<Self, TechniqueError> {
-        let features = frame.features();
-        let missing = [
-            (features.geometry_shader, "geometry shaders"),
-            (features.vertex_stores_and_atomics, "atomics in geometry shaders"),
-        ];
-        if let Some((_, missing)) = missing.iter().find(|(there, _)| !there) {
-            return Err(TechniqueError::Unavailable { technique, missing: (*missing).to_owned() });
-        }
+        check_numbering(frame, technique)?;
         let shader = frame.shader("geometry/number.geom")?;
-        self.opaque.geometry = Some(shader.clone());
-        self.masked.geometry = Some(shader);
+        (self.opaque.geometry, self.masked.geometry) = (Some(shader.clone()), Some(shader));
+        Ok(self)
+    }
+
+    /// As [`Self::numbered`], and hands every fragment its whole triangle (`geometry/whole_triangle.glsl`).
+    ///
+    /// # Errors
+    /// A device that counts in no geometry shader.
+    pub fn whole_triangles(
+        mut self,
+        frame: &Frame<'_>,
+        technique: &'static str,
+    ) -> Result<Self, TechniqueError> {
+        check_numbering(frame, technique)?;
+        let shader = frame.shader("geometry/number.geom#whole")?;
+        (self.opaque.geometry, self.masked.geometry) = (Some(shader.clone()), Some(shader));
+        Ok(self)
+    }
+
+    /// Puts a geometry shader into what [`Self::depth_only`] draws that changes nothing, so that a pass with another one and an
+    /// equal depth test meets its depths.
+    ///
+    /// # Errors
+    /// A shader that is not compiled in.
+    pub fn through_geometry(mut self, frame: &Frame<'_>) -> Result<Self, TechniqueError> {
+        self.opaque.geometry = Some(frame.shader("geometry/pass.geom#position")?);
+        self.masked.geometry = Some(frame.shader("geometry/pass.geom#uv")?);
         Ok(self)
     }
 
@@ -215,6 +233,19 @@ impl Surfaces {
         draw.push = self.push.clone();
         draw.scissor = self.scissor;
         draw
+    }
+}
+
+/// Checks that the device can number triangles.
+fn check_numbering(frame: &Frame<'_>, technique: &'static str) -> Result<(), TechniqueError> {
+    let features = frame.features();
+    let missing = [
+        (features.geometry_shader, "geometry shaders"),
+        (features.vertex_stores_and_atomics, "atomics in geometry shaders"),
+    ];
+    match missing.iter().find(|(there, _)| !there) {
+        Some((_, missing)) => Err(TechniqueError::Unavailable { technique, missing: (*missing).to_owned() }),
+        None => Ok(()),
     }
 }
 

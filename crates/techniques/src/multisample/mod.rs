@@ -107,8 +107,8 @@ pub fn fill_dedup(
     let mut count = None;
     if numbered {
         surfaces = surfaces.numbered(frame, technique)?;
-        let buffer = graph.buffer(&format!("{technique}/triangle count"), 4);
-        count = Some(graph.clear_buffer(&format!("{technique}/clear triangle count"), buffer, 0));
+        let buffer = graph.buffer(&format!("{technique}/triangle numbers"), 4);
+        count = Some(graph.clear_buffer(&format!("{technique}/clear triangle numbers"), buffer, 0));
     }
     let images = [
         ("gbuffer_base_color", vk::Format::R8G8B8A8_SRGB, Load::DontCare),
@@ -141,7 +141,7 @@ fn fill(
     let mut pass = graph.raster(&format!("{technique}/gbuffer"));
     frame.bind_scene(&mut pass);
     if let Some(count) = triangle_count {
-        let _count = pass.write("TriangleCount", count);
+        let _count = pass.write("TriangleNumbers", count);
     }
     let images = declared.into_iter().map(|(slot, image, load)| (slot, pass.color(image, load))).collect();
     let depth = pass.depth(depth, Load::Clear(0.0));

@@ -1,5 +1,6 @@
 // Writes the record of each visible triangle (Schied and Dachsbacher 2015, section 4.2 and appendix A). A thread a triangle
-// of the scene; those that do not show end at once. With LISTED a thread a stored triangle, whose ID stands in its record.
+// of the scene; those that do not show end at once. With LISTED a thread a stored triangle, whose ID stands in its record, or with
+// WHOLE_TRIANGLE its vertices.
 //
 // Departure: the paper clips triangles by shrinking them, since its barycentric coordinates (equations 3 and 4) need projected
 // vertices. With homogeneous ones (Olano and Greer 1997) the edge functions b_i of the clip positions are affine on the screen as
@@ -11,6 +12,9 @@
 #extension GL_GOOGLE_include_directive : require
 #include "triangle.glsl"
 #include "triangle_buffer/record.glsl"
+#ifdef WHOLE_TRIANGLE
+#include "triangle_buffer/vertices.glsl"
+#endif
 #ifndef LISTED
 #include "triangle_buffer/index.glsl"
 #endif
@@ -72,14 +76,128 @@ vec2 anchor_px(vec3 c0, vec3 c1, vec3 c2) {
     return count > 0.0 ? floor(sum / count) : vec2(frame.size_px / 2u);
 }
 
+// A triangle's vertices, a column each.
+struct TriangleVertices {
+    mat3 position_ws;
+    mat3 normal_ws;     // their lengths are weights
+    mat3x2 uv0;
+    mat3x2 uv1;         // where the scene has them
+    mat3x4 color;       // where the scene has them
+    uint material;
+    bool turned;        // WHOLE_TRIANGLE: the back faces the eye; else: the draw is mirrored
+};
+
+#ifdef WHOLE_TRIANGLE
+uvec4 record_words(uint word) {
+    return uvec4(triangle_buffer[word], triangle_buffer[word + 1u], triangle_buffer[word + 2u], triangle_buffer[word + 3u]);
+}
+
+mat3x2 stored_uv(uint word) {
+    return mat3x2(uintBitsToFloat(record_words(word)), uintBitsToFloat(record_words(word + 2u).zw));
+}
+
+// The vertices that a fragment has stored in a record.
+TriangleVertices stored_vertices(uint record) {
+    TriangleVertices t;
+    for (uint i = 0u; i < 3u; ++i) {
+        t.position_ws[i] = uintBitsToFloat(record_words(record + 3u * i).xyz);
+    }
+    t.normal_ws = unpacked_normals(uvec4(record_words(record + 9u).xyz, triangle_buffer[record + 19u]));
+    t.uv0 = stored_uv(record + 12u);
+    t.uv1 = HAS_UV1 != 0u ? stored_uv(record + UV1_WORD) : t.uv0;
+    t.color = mat3x4(1.0);
+    if (HAS_VERTEX_COLOR != 0u) {
+        for (uint i = 0u; i < 3u; ++i) {
+            t.color[i] = uintBitsToFloat(record_words(record + COLOR_WORD + 4u * i));
+        }
+    }
+    t.material = triangle_buffer[record + 18u] & ~RECORD_FRONT;
+    t.turned = (triangle_buffer[record + 18u] & RECORD_FRONT) == 0u;
+    return t;
+}
+#else
+// The vertices of the scene's triangle `triangle` of a draw.
+TriangleVertices fetched_vertices(uint draw, uint triangle) {
+    DrawData d = load_draw(draw_data, draw);
+    uvec3 v = triangle_vertices(draw << TRIANGLE_BITS | triangle, d);
+    uvec3 a = v * 7u;
+    TriangleVertices t;
+    t.material = d.material;
+    t.turned = (d.flags & DRAW_MIRRORED) != 0u;
+    t.color = mat3x4(1.0);
+    for (uint i = 0u; i < 3u; ++i) {
+        t.position_ws[i] = load_position(d, v[i]);
+        t.normal_ws[i] = normal_to_world(d.object_row0, d.object_row1, d.object_row2, t.turned, unpack_normal(attributes[a[i]]));
+        t.uv0[i] = load_uv(a[i], 2u);
+        t.uv1[i] = HAS_UV1 != 0u ? load_uv(a[i], 4u) : t.uv0[i];
+        if (HAS_VERTEX_COLOR != 0u) {
+            t.color[i] = unpackUnorm4x8(attributes[a[i] + 6u]);
+        }
+    }
+    return t;
+}
+#endif
+
+// The edge functions of a triangle at an anchor, over their determinant.
+Basis basis_at(vec2 anchor, vec3 c0, vec3 c1, vec3 c2, out float inverse_det) {
+    vec2 ndc = (anchor + 0.5) * 2.0 / vec2(frame.size_px) - 1.0;
+    vec2 pixel_ndc = 2.0 / vec2(frame.size_px);
+    vec2 q0 = c0.xy - ndc * c0.z, q1 = c1.xy - ndc * c1.z, q2 = c2.xy - ndc * c2.z;
+    vec3 w = vec3(c0.z, c1.z, c2.z);
+    vec3 b = vec3(cross2(q1, q2), cross2(q2, q0), cross2(q0, q1));
+    vec3 bx = vec3(w.z * q1.y - w.y * q2.y, w.x * q2.y - w.z * q0.y, w.y * q0.y - w.x * q1.y);
+    vec3 by = vec3(w.y * q2.x - w.z * q1.x, w.z * q0.x - w.x * q2.x, w.x * q1.x - w.y * q0.x);
+    inverse_det = 1.0 / dot(b, w);
+    return Basis(b * inverse_det, bx * (inverse_det * pixel_ndc.x), by * (inverse_det * pixel_ndc.y));
+}
+
+void store_uv(uint word, Basis basis, mat3x2 uv) {
+    for (uint i = 0u; i < 2u; ++i) {
+        store(word + 3u * i, affine(basis, vec3(uv[0][i], uv[1][i], uv[2][i])));
+    }
+}
+
+void store_record(uint record, TriangleVertices t) {
+    mat3 p = t.position_ws;
+    vec3 c0 = clip_xyw(p[0]), c1 = clip_xyw(p[1]), c2 = clip_xyw(p[2]);
+    vec2 anchor = anchor_px(c0, c1, c2);
+    float inverse_det;
+    Basis basis = basis_at(anchor, c0, c1, c2, inverse_det);
+#ifdef WHOLE_TRIANGLE
+    // As the rasteriser saw it: of a sliver, rounding may turn what is computed again.
+    bool front = !t.turned;
+#else
+    // On the screen counter-clockwise where the edge functions' sum is negative where 1/w is positive: det < 0.
+    bool front = (inverse_det < 0.0) != t.turned;
+#endif
+    vec3 of_w = vec3(1.0);
+    if (frame.eye_ws.w == 0.0) {
+        of_w = vec3(dot(frame.distance_from_world, vec4(p[0], 1.0)), dot(frame.distance_from_world, vec4(p[1], 1.0)),
+                    dot(frame.distance_from_world, vec4(p[2], 1.0)));
+    }
+    store(record, affine(basis, of_w));
+    for (uint i = 0u; i < 3u; ++i) {
+        store(record + 3u + 3u * i, affine(basis, vec3(t.normal_ws[0][i], t.normal_ws[1][i], t.normal_ws[2][i])));
+    }
+    store_uv(record + 12u, basis, t.uv0);
+    triangle_buffer[record + 18u] = t.material | (front ? RECORD_FRONT : 0u);
+    triangle_buffer[record + 19u] = uint(anchor.x) | uint(anchor.y) << 16;
+    if (HAS_UV1 != 0u) {
+        store_uv(record + UV1_WORD, basis, t.uv1);
+    }
+    if (HAS_VERTEX_COLOR != 0u) {
+        for (uint i = 0u; i < 4u; ++i) {
+            store(record + COLOR_WORD + 3u * i, affine(basis, vec3(t.color[0][i], t.color[1][i], t.color[2][i])));
+        }
+    }
+}
+
 void main() {
 #ifdef LISTED
     uint index = gl_GlobalInvocationID.x;
     if (index >= min(triangles_needed, TRIANGLE_CAPACITY)) {
         return;
     }
-    uint id = triangle_buffer[index * RECORD_WORDS];
-    uint draw_slot = id >> TRIANGLE_BITS, triangle = id & ((1u << TRIANGLE_BITS) - 1u);
 #else
     uint draw_slot = first_draw + gl_WorkGroupID.x;
     uint triangle = gl_WorkGroupID.y * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
@@ -92,61 +210,19 @@ void main() {
         return;
     }
 #endif
+    uint record = index * RECORD_WORDS;
+#ifdef WHOLE_TRIANGLE
+    store_record(record, stored_vertices(record));
+#else
+#ifdef LISTED
+    uint id = triangle_buffer[record];
+    uint draw_slot = id >> TRIANGLE_BITS, triangle = id & ((1u << TRIANGLE_BITS) - 1u);
+#endif
 #ifdef SAMPLES_IN_KEYS
     uint draw = draw_commands[draw_slot * 5u + 4u];
 #else
     uint draw = draw_slot;
 #endif
-    DrawData d = load_draw(draw_data, draw);
-    uvec3 v = triangle_vertices(draw << TRIANGLE_BITS | triangle, d);
-    vec3 p0 = load_position(d, v.x), p1 = load_position(d, v.y), p2 = load_position(d, v.z);
-    vec3 c0 = clip_xyw(p0), c1 = clip_xyw(p1), c2 = clip_xyw(p2);
-    vec2 anchor = anchor_px(c0, c1, c2);
-    vec2 ndc = (anchor + 0.5) * 2.0 / vec2(frame.size_px) - 1.0;
-    vec2 pixel_ndc = 2.0 / vec2(frame.size_px);
-
-    vec2 q0 = c0.xy - ndc * c0.z, q1 = c1.xy - ndc * c1.z, q2 = c2.xy - ndc * c2.z;
-    vec3 w = vec3(c0.z, c1.z, c2.z);
-    vec3 b = vec3(cross2(q1, q2), cross2(q2, q0), cross2(q0, q1));
-    vec3 bx = vec3(w.z * q1.y - w.y * q2.y, w.x * q2.y - w.z * q0.y, w.y * q0.y - w.x * q1.y);
-    vec3 by = vec3(w.y * q2.x - w.z * q1.x, w.z * q0.x - w.x * q2.x, w.x * q1.x - w.y * q0.x);
-    float inverse_det = 1.0 / dot(b, w);
-    Basis basis = Basis(b * inverse_det, bx * (inverse_det * pixel_ndc.x), by * (inverse_det * pixel_ndc.y));
-
-    bool mirrored = (d.flags & DRAW_MIRRORED) != 0u;
-    // On the screen counter-clockwise where the edge functions' sum is negative where 1/w is positive: det < 0.
-    bool front = (inverse_det < 0.0) != mirrored;
-    uvec3 a = v * 7u;
-    uint record = index * RECORD_WORDS;
-    vec3 of_w = vec3(1.0);
-    if (frame.eye_ws.w == 0.0) {
-        of_w = vec3(dot(frame.distance_from_world, vec4(p0, 1.0)), dot(frame.distance_from_world, vec4(p1, 1.0)),
-                    dot(frame.distance_from_world, vec4(p2, 1.0)));
-    }
-    store(record, affine(basis, of_w));
-    mat3 n = mat3(normal_to_world(d.object_row0, d.object_row1, d.object_row2, mirrored, unpack_normal(attributes[a.x])),
-                  normal_to_world(d.object_row0, d.object_row1, d.object_row2, mirrored, unpack_normal(attributes[a.y])),
-                  normal_to_world(d.object_row0, d.object_row1, d.object_row2, mirrored, unpack_normal(attributes[a.z])));
-    for (uint i = 0u; i < 3u; ++i) {
-        store(record + 3u + 3u * i, affine(basis, vec3(n[0][i], n[1][i], n[2][i])));
-    }
-    mat3x2 uv = mat3x2(load_uv(a.x, 2u), load_uv(a.y, 2u), load_uv(a.z, 2u));
-    for (uint i = 0u; i < 2u; ++i) {
-        store(record + 12u + 3u * i, affine(basis, vec3(uv[0][i], uv[1][i], uv[2][i])));
-    }
-    triangle_buffer[record + 18u] = d.material | (front ? RECORD_FRONT : 0u);
-    triangle_buffer[record + 19u] = uint(anchor.x) | uint(anchor.y) << 16;
-    if (HAS_UV1 != 0u) {
-        mat3x2 uv1 = mat3x2(load_uv(a.x, 4u), load_uv(a.y, 4u), load_uv(a.z, 4u));
-        for (uint i = 0u; i < 2u; ++i) {
-            store(record + UV1_WORD + 3u * i, affine(basis, vec3(uv1[0][i], uv1[1][i], uv1[2][i])));
-        }
-    }
-    if (HAS_VERTEX_COLOR != 0u) {
-        mat3x4 color = mat3x4(unpackUnorm4x8(attributes[a.x + 6u]), unpackUnorm4x8(attributes[a.y + 6u]),
-                              unpackUnorm4x8(attributes[a.z + 6u]));
-        for (uint i = 0u; i < 4u; ++i) {
-            store(record + COLOR_WORD + 3u * i, affine(basis, vec3(color[0][i], color[1][i], color[2][i])));
-        }
-    }
+    store_record(record, fetched_vertices(draw, triangle));
+#endif
 }

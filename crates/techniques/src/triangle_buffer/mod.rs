@@ -47,7 +47,8 @@ fn record_bytes(frame: &Frame<'_>) -> u64 {
     80 + 24 * u64::from(has("HAS_UV1")) + 48 * u64::from(has("HAS_VERTEX_COLOR"))
 }
 
-/// A triangle buffer that fragments append to: a list of triangle IDs, one in the first word of each record.
+/// A triangle buffer that fragments append to: a triangle ID in the first word of each record or, in tessellated frames, the
+/// triangle's vertices.
 pub struct List {
     records: BufferHandle,
     count: BufferHandle,
@@ -84,8 +85,8 @@ impl List {
         Self { records, count, ..self }
     }
 
-    /// Declares the pass that overwrites each listed ID by its triangle's record, sized on the device, and returns the
-    /// records.
+    /// Declares the pass that overwrites what fragments stored of each triangle by its record, sized on the device, and
+    /// returns the records.
     ///
     /// # Errors
     /// A shader that is not compiled in.
@@ -104,7 +105,8 @@ impl List {
         pass.dispatch([1, 1, 1]);
         pass.finish();
 
-        let shader = frame.shader("triangle_buffer/derivatives.comp#list")?;
+        let stored = if frame.tessellate_px.is_some() { "vertices" } else { "list" };
+        let shader = frame.shader(&format!("triangle_buffer/derivatives.comp#{stored}"))?;
         let mut pass = frame.compute(graph, &format!("{technique}/derivatives"), &shader);
         pass.constant("TRIANGLE_CAPACITY", self.capacity);
         pass.read("TriangleCount", &self.count);
@@ -116,9 +118,14 @@ impl List {
     }
 }
 
+/// Triangles that there should be room for: what earlier frames of the view needed, and more.
+pub fn capacity(frame: &Frame<'_>) -> u32 {
+    frame.capacity("triangles", FIRST_GUESS)
+}
+
 /// Triangles that there should be room for, and their bytes.
 fn room(frame: &Frame<'_>, technique: &str) -> Result<(u32, u64), TechniqueError> {
-    let capacity = frame.capacity("triangles", FIRST_GUESS);
+    let capacity = capacity(frame);
     let bytes = record_bytes(frame) * u64::from(capacity);
     let limit = frame.features().max_storage_buffer_range;
     if bytes > limit {

@@ -1,0 +1,64 @@
+//! The two passes over the scene of techniques whose fragments store their triangles (Schied and Dachsbacher 2015, Figure 3).
+
+use afterlight_graph::{BufferHandle, DepthTest, Graph, RasterPass};
+
+use crate::{Info, error::TechniqueError, frame::Frame, geometry::Surfaces};
+
+/// What the two passes draw: depth, then, with an equal test, fragments that store their triangles. In tessellated frames both
+/// have a geometry shader, so that their depths are equal; that of the second numbers triangles and hands them on whole.
+pub(crate) struct ScenePasses {
+    /// Depth alone.
+    pub depth: Surfaces,
+    /// Fragments that store their triangles.
+    pub fill: Surfaces,
+    numbers: Option<BufferHandle>,
+}
+
+impl ScenePasses {
+    /// `fragment` names the second pass's shader, `tags` its variant besides `mask` and `whole`.
+    ///
+    /// # Errors
+    /// In a tessellated frame, a device that counts in no geometry shader.
+    pub fn new(
+        graph: &mut Graph,
+        frame: &Frame<'_>,
+        info: &Info,
+        fragment: &str,
+        tags: &[&str],
+    ) -> Result<Self, TechniqueError> {
+        let whole = frame.tessellate_px.is_some();
+        let tags = [if whole { &["whole"][..] } else { &[] }, tags].concat();
+        let opaque = variant(fragment, &tags);
+        let masked = variant(fragment, &[&["mask"], &tags[..]].concat());
+        let depth = Surfaces::depth_only(frame)?;
+        if !whole {
+            let fill = Surfaces::new(
+                frame,
+                ("geometry/surface.vert#position", Some(&opaque)),
+                ("geometry/surface.vert#uv", &masked),
+            )?;
+            return Ok(Self { depth, fill: fill.depth(DepthTest::EQUAL), numbers: None });
+        }
+        let fill = Surfaces::shaded(frame, &opaque, &masked)?.whole_triangles(frame, info.id)?;
+        let numbers = graph.buffer(&format!("{}/triangle numbers", info.id), 4);
+        let numbers = graph.clear_buffer(&format!("{}/clear triangle numbers", info.id), numbers, 0);
+        Ok(Self {
+            depth: depth.through_geometry(frame)?,
+            fill: fill.depth(DepthTest::EQUAL),
+            numbers: Some(numbers),
+        })
+    }
+
+    /// Binds what the second pass counts triangles with and adds its draws.
+    pub fn draw_fill(self, frame: &Frame<'_>, pass: &mut RasterPass<'_>) {
+        if let Some(numbers) = self.numbers {
+            let _numbers = pass.write("TriangleNumbers", numbers);
+        }
+        self.fill.draw(frame, pass);
+    }
+}
+
+/// Name of a shader's variant.
+fn variant(name: &str, tags: &[&str]) -> String {
+    if tags.is_empty() { name.to_owned() } else { format!("{name}#{}", tags.join("-")) }
+}
