@@ -214,6 +214,18 @@ pub fn dais(w: &Workload) -> Cost {
     }
 }
 
+/// The project's own: [`dais`] with the triangle buffer filled by fragments: the scene is drawn twice, and what shows alone writes
+/// a triangle's name.
+pub fn dais_cached(w: &Workload) -> Cost {
+    let once = dais(w);
+    Cost {
+        cmd: 2.0 * once.cmd,
+        proc: once.proc + w.vertices(),
+        mem: once.mem,
+        band: once.band + w.vertex_traffic() + (w.pixels - w.object_fragments) * w.shading_samples,
+    }
+}
+
 /// The project's own: [`dais`] with a float a sample (depth), a float a pixel (the head) and two a surface where a pixel shows
 /// several; the scene is drawn twice.
 pub fn dais_list(w: &Workload) -> Cost {
@@ -326,6 +338,9 @@ mod tests {
                 band: 200.0 + 400.0 + 40.0 * 15.5 + 420.0 + 210.0
             }
         );
+        let (once, cached) = (dais(&four), dais_cached(&four));
+        assert_eq!((cached.cmd, cached.mem), (20.0, once.mem));
+        assert_eq!((cached.proc - once.proc, cached.band - once.band), (100.0, 200.0 - 40.0));
         assert_eq!(
             visibility_buffer(&w),
             Cost { cmd: 15.0, proc: 100.0 + 24.0 + 70.0, mem: 120.0, band: 300.0 + 4.0 + 25.0 + 347.0 }

@@ -23,6 +23,7 @@ fn ways(id: &str) -> &'static [&'static [(&'static str, &'static str)]] {
             &[("visibility", "compute")],
             &[("fill", "cache")],
             &[("fill", "cache"), ("cache-buckets", "1")],
+            &[("fill", "cache"), ("reference-bits", "8")],
         ],
         "dais-list" => &[&[], &[("cache-buckets", "1")]],
         _ => &[&[]],

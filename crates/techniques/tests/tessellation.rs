@@ -3,8 +3,9 @@
 
 mod common;
 
+use afterlight_image::Rgba8Image;
 use afterlight_techniques::{
-    Settings, Technique, TechniqueError, find,
+    Params, Renderer, Settings, Technique, TechniqueError, find,
     geometry::MAX_DISPLACEMENT_M,
     graph::gpu,
     registry,
@@ -26,6 +27,15 @@ fn tessellating() -> impl Iterator<Item = (&'static dyn Technique, u32)> {
 /// Settings at a technique's sample count, tessellated.
 fn tessellated(settings: &Settings, samples: u32, edge_px: f32, displacement_m: f32) -> Settings {
     Settings { samples, tessellate_px: Some(edge_px), displacement_m, ..settings.clone() }
+}
+
+/// A technique's parameters from pairs.
+fn params(technique: &dyn Technique, sets: &[(&str, &str)]) -> Params {
+    let mut params = Params::default();
+    for (key, value) in sets {
+        params.set(technique.info(), key, value).unwrap_or_else(|e| panic!("{e}"));
+    }
+    params
 }
 
 /// Whether the device has what tessellation takes, besides what all need.
@@ -128,6 +138,14 @@ fn what_cannot_says_so() {
         let error = refused(*technique, &tessellated(&settings, samples, 8.0, 0.0));
         assert!(matches!(error, TechniqueError::Untessellated { .. }), "{error}");
     }
+    let dais = find("dais").unwrap();
+    for (key, value) in [("fill", "resolve"), ("visibility", "compute")] {
+        let settings = tessellated(&settings, 1, 8.0, 0.0);
+        let params = params(dais, &[(key, value)]);
+        let error = stage.try_prepare(dais, &settings, &params).err().expect("refused");
+        assert!(matches!(error, TechniqueError::Conflict { .. }), "{error}");
+        println!("{error}");
+    }
     let forward = find("forward").unwrap();
     for wrong in [
         Settings { displacement_m: 0.01, ..settings.clone() },
@@ -213,7 +231,9 @@ fn no_crack_opens() {
             for (edge_px, displacement_m) in
                 [(64.0, 0.0), (7.0, 0.0), (13.0, 0.03), (3.0, MAX_DISPLACEMENT_M)]
             {
-                for technique in ["forward", "deferred-dedup"].map(|id| find(id).unwrap()) {
+                for technique in
+                    ["forward", "deferred-dedup", "dais", "dais-list"].map(|id| find(id).unwrap())
+                {
                     let settings = tessellated(settings, 4, edge_px, displacement_m);
                     let image = stage.image(technique, &settings);
                     let found = white_pixels(&image.pixels);
@@ -229,21 +249,38 @@ fn no_crack_opens() {
     }
 }
 
-/// A stage of tessellation with a part of its text replaced.
-fn mutant(file: &str, tag: &str, defines: &[&str], from: &str, to: &str) -> Shader {
-    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("src/geometry");
+/// A technique's image with one shader replaced.
+fn image_with(
+    stage: &Stage,
+    technique: &dyn Technique,
+    settings: &Settings,
+    sets: &[(&str, &str)],
+    shader: &Shader,
+) -> Rgba8Image {
+    let renderer = Renderer::with_scene(&stage.device, stage.uploaded.clone(), settings);
+    let mut renderer = renderer.unwrap_or_else(|e| panic!("{e}"));
+    renderer.add_shaders([shader.clone()]);
+    let prepared = renderer.prepare(technique, &params(technique, sets));
+    image_of(&mut prepared.unwrap_or_else(|e| panic!("{e}")))
+}
+
+/// A shader with a part of its text replaced.
+fn mutant(name: &str, tag: &str, defines: &[&str], from: &str, to: &str) -> Shader {
+    let source = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let (folder_name, file) = name.split_once('/').expect("folder/file");
+    let folder = source.join(folder_name);
     let text = std::fs::read_to_string(folder.join(file)).expect("a shader");
     assert!(text.contains(from), "{file} has changed: found no {from:?}");
     let path = std::env::temp_dir().join(format!("afterlight-{}-{file}", std::process::id()));
     std::fs::write(&path, text.replace(from, to)).expect("a file in the temporary folder");
     let variant = manifest::Variant {
-        name: format!("geometry/{}{tag}", file.trim_end_matches(".glsl")),
+        name: format!("{}{tag}", name.trim_end_matches(".glsl")),
         stage: manifest::stage_of(file).expect("a stage"),
         path: path.clone(),
         folder,
         defines: defines.iter().map(|d| ((*d).to_owned(), None)).collect(),
     };
-    let compiled = Compiler::new().compile(&variant).unwrap_or_else(|e| panic!("{e}"));
+    let compiled = Compiler::new().include_dir(source).compile(&variant).unwrap_or_else(|e| panic!("{e}"));
     std::fs::remove_file(&path).expect("the file");
     compiled.shader
 }
@@ -257,14 +294,14 @@ fn cracks_are_caught() {
         return;
     }
     let along_normals = mutant(
-        "surface.tese.glsl",
+        "geometry/surface.tese.glsl",
         "",
         &[],
         "world = displaced(world, DISPLACEMENT_M, columns);",
         "world -= DISPLACEMENT_M * normalize(AT_POINT(patch_normal_ws));",
     );
     let by_triangle = mutant(
-        "surface.tesc.glsl",
+        "geometry/surface.tesc.glsl",
         "",
         &[],
         "gl_TessLevelOuter[0] = edges.x;",
@@ -276,12 +313,8 @@ fn cracks_are_caught() {
             .iter()
             .map(|settings| {
                 let settings = tessellated(settings, 1, 7.0, 0.05);
-                let renderer =
-                    afterlight_techniques::Renderer::with_scene(&gpu, stage.uploaded.clone(), &settings);
-                let mut renderer = renderer.unwrap_or_else(|e| panic!("{e}"));
-                renderer.add_shaders([shader.clone()]);
-                let prepared = renderer.prepare(find("forward").unwrap(), &Default::default());
-                white_pixels(&image_of(&mut prepared.unwrap_or_else(|e| panic!("{e}"))).pixels)
+                let forward = find("forward").unwrap();
+                white_pixels(&image_with(&stage, forward, &settings, &[], &shader).pixels)
             })
             .sum();
         println!("{}: {seen} pixels of background", shader.name);
@@ -331,4 +364,174 @@ fn triangles_have_the_size_asked_for() {
     let statistics = report.pass("forward/shade").and_then(|pass| pass.statistics).expect("statistics");
     assert!(statistics.input_primitives > 0, "{statistics:?}");
     assert_eq!(statistics.clipping_invocations, 0, "patches out of view are divided");
+}
+
+/// The colonnade, masked surfaces among others, with colours at its vertices and base colours read at second texture
+/// coordinates.
+fn colored() -> Scene {
+    let source = "builtin:colonnade?triangles=30000&texture=64";
+    let mut scene = afterlight_techniques::scene::load_source(source, &Default::default())
+        .unwrap_or_else(|e| panic!("{e}"));
+    // Smooth: at the pixel's centre, perhaps outside of the triangle, no colour leaves the range of a G-buffer.
+    for (attributes, p) in scene.attributes.iter_mut().zip(&scene.positions_os) {
+        let [r, g, b] = p.map(|x| (150.0 + 80.0 * (3.0 * x).sin()) as u8);
+        attributes.color_rgba8 = u32::from_le_bytes([r, g, b, 255]);
+        let [u, v] = attributes.uv0.map(f32::from_bits);
+        attributes.uv1 = [(0.7 * v + 0.1).to_bits(), (1.3 * u - 0.2).to_bits()];
+    }
+    for texture in scene.materials.iter_mut().filter_map(|m| m.base_color_texture.as_mut()) {
+        texture.uv_set = 1;
+    }
+    scene
+}
+
+/// Ways in which fragments store tessellated triangles: layouts of references, a cache of one lock, lists.
+const WAYS: &[(&str, &[(&str, &str)])] = &[
+    ("dais", &[]),
+    ("dais", &[("lights", "tiled"), ("cache-buckets", "1"), ("reference-bits", "8")]),
+    ("dais-list", &[]),
+    ("dais-list", &[("lights", "tiled"), ("cache-buckets", "1")]),
+];
+
+/// Scenes and views in which tessellated triangles are stored: masked surfaces, attributes that few scenes have, surfaces that the
+/// near plane cuts where they show.
+fn stored_views(gpu: &gpu::Device) -> Vec<(&'static str, Stage, Settings)> {
+    let colonnade = Stage::new(gpu, "builtin:colonnade?triangles=30000");
+    let colonnade_view = colonnade.settings((160, 90), 20);
+    let colored = Stage::of(gpu, colored());
+    let colored_view = colored.settings((160, 90), 20);
+    let mut ball = ball();
+    ball.materials.iter_mut().for_each(|m| (m.unlit, m.base_color_factor) = (false, [0.8, 0.5, 0.3, 1.0]));
+    let ball = Stage::of(gpu, ball);
+    let eye = Vec3::new(0.11, -0.07, 0.05);
+    let cut = Camera::look_at("cut", eye, Vec3::new(1.0, 0.9, 1.1), 1.9, 0.6);
+    let ball_view = ball.from(cut, (160, 90), 20);
+    vec![
+        ("colonnade", colonnade, colonnade_view),
+        ("colours", colored, colored_view),
+        ("near plane", ball, ball_view),
+    ]
+}
+
+/// Triangles that fragments store are the surfaces that `deferred-dedup` and `forward` see, however fragments race.
+#[test]
+fn stored_triangles_equal_the_deduplicated_samples() {
+    let gpu = afterlight_testkit::gpu();
+    if !can(&gpu) {
+        return;
+    }
+    for (what, stage, view) in stored_views(&gpu) {
+        for (samples, edge_px, displacement_m) in [(1, 4.0, 0.05), (4, 6.0, 0.0), (4, 32.0, 0.1)] {
+            let settings = tessellated(&view, samples, edge_px, displacement_m);
+            let forward = stage.image(find("forward").unwrap(), &settings);
+            let dedup = (samples > 1).then(|| stage.image(find("deferred-dedup").unwrap(), &settings));
+            for (id, sets) in WAYS {
+                let technique = find(id).unwrap();
+                if !technique.info().samples.contains(&samples) {
+                    continue;
+                }
+                let mut prepared = stage.prepare_with(technique, &settings, &params(technique, sets));
+                for run in 0..2 {
+                    let image = image_of(&mut prepared);
+                    let to_forward = psnr(&forward, &image);
+                    let to_dedup = dedup.as_ref().map_or(f64::INFINITY, |dedup| psnr(dedup, &image));
+                    let name = format!(
+                        "{what}, {samples} samples, {edge_px} px, {displacement_m} m: {id} {sets:?} run {run}"
+                    );
+                    println!("{name}: {to_dedup:.2} dB to deferred-dedup, {to_forward:.2} to forward");
+                    assert!(to_dedup >= MIN_PSNR_DB, "{name}: {to_dedup:.2} dB to deferred-dedup");
+                    assert!(to_forward >= 40.0, "{name}: {to_forward:.2} dB to forward");
+                }
+            }
+        }
+    }
+}
+
+/// What is stored wrongly is seen: vertices in another order than their attributes, a vertex's normal in place of another's,
+/// lengths of normals left out, sides mixed up, second coordinates and colours of one vertex for all.
+#[test]
+fn wrongly_stored_triangles_are_caught() {
+    let gpu = afterlight_testkit::gpu();
+    if !can(&gpu) {
+        return;
+    }
+    let whole = |from, to| mutant("geometry/number.geom.glsl", "#whole", &["WHOLE_TRIANGLE"], from, to);
+    let read = |from, to| {
+        let defines = ["LISTED", "WHOLE_TRIANGLE"];
+        mutant("triangle_buffer/derivatives.comp.glsl", "#vertices", &defines, from, to)
+    };
+    let mutants = [
+        ("colonnade", "order", whole("= in_position_ws[k]", "= in_position_ws[(k + 1) % 3]")),
+        (
+            "colonnade",
+            "normal",
+            whole("packed_normals(in_normal_ws[0], ", "packed_normals(in_normal_ws[1], "),
+        ),
+        (
+            "colonnade",
+            "lengths",
+            read(
+                "unpacked_normals(uvec4(record_words(record + 9u).xyz, triangle_buffer[record + 19u]))",
+                "unpacked_normals(uvec4(record_words(record + 9u).xyz, 0x3fffffffu))",
+            ),
+        ),
+        ("colonnade", "side", read("& RECORD_FRONT) == 0u", "& RECORD_FRONT) != 0u")),
+        ("colours", "second coordinates", read("stored_uv(record + UV1_WORD)", "stored_uv(record + 12u)")),
+        ("colours", "colour", whole("= in_color[k]", "= in_color[0]")),
+    ];
+    let stages = stored_views(&gpu);
+    let dais = find("dais").unwrap();
+    for (what, name, shader) in mutants {
+        let (_, stage, view) = stages.iter().find(|(known, ..)| *known == what).expect("a view");
+        let settings = tessellated(view, 4, 32.0, 0.1);
+        let db = psnr(&stage.image(dais, &settings), &image_with(stage, dais, &settings, &[], &shader));
+        println!("{what}: {name}: {db:.2} dB");
+        assert!(db < MIN_PSNR_DB, "{what}: {name}: a mutant within the bound: {db:.2} dB");
+    }
+}
+
+/// Where triangles need more bits than a sample that holds coverage has, samples of 32 bits of reference give the same image;
+/// the frame is recorded again with them when its count asks for them.
+#[test]
+fn wide_references_give_the_same_image() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=60000");
+    let dais = find("dais").unwrap();
+    let is_wide = |prepared: &mut afterlight_techniques::Prepared| {
+        let plan = prepared.executor().plan();
+        let [narrow, wide] = ["dais/references", "dais/wide references"].map(|n| plan.resource(n).is_some());
+        assert_ne!(narrow, wide, "one layout a frame");
+        wide
+    };
+    for samples in [1, 4] {
+        let settings = Settings { samples, ..stage.settings((320, 180), 20) };
+        let image = |bits: &str, expected_wide: bool| {
+            let sets = [("fill", "cache"), ("reference-bits", bits)];
+            let mut prepared = stage.prepare_with(dais, &settings, &params(dais, &sets));
+            let counters = prepared.counters().unwrap_or_else(|e| panic!("{e}"));
+            let stored = counters.iter().find(|c| c.name == "triangles").expect("counted");
+            println!("{samples} samples, {bits} bits: {} triangles", stored.needed);
+            assert_eq!(is_wide(&mut prepared), expected_wide, "{samples} samples, {bits} bits: {stored:?}");
+            assert_eq!(stored.dropped, 0);
+            image_of(&mut prepared)
+        };
+        let narrow = image("24", false);
+        // 8 bits are less than the first frame has room for, 13 are more, and less than the view needs room for.
+        for bits in ["8", "13"] {
+            let db = psnr(&narrow, &image(bits, true));
+            println!("{samples} samples, {bits} bits: {db:.2} dB");
+            assert_eq!(
+                db,
+                f64::INFINITY,
+                "{samples} samples, {bits} bits: not the image of the narrow layout"
+            );
+        }
+        // References cut to what fewer bits hold are caught.
+        let defines = ["WIDE"];
+        let cut = "memoized(fragment_triangle()) & 0x1ffu";
+        let shader = mutant("dais/fill.frag.glsl", "#wide", &defines, "memoized(fragment_triangle())", cut);
+        let sets = [("fill", "cache"), ("reference-bits", "8")];
+        let db = psnr(&narrow, &image_with(&stage, dais, &settings, &sets, &shader));
+        assert!(db < MIN_PSNR_DB, "references cut short within the bound: {db:.2} dB");
+    }
 }

@@ -132,8 +132,11 @@ impl Technique for Dais {
         &INFO
     }
 
-    fn predict(&self, workload: &Workload, _: &Params) -> Cost {
-        cost::dais(workload)
+    fn predict(&self, workload: &Workload, params: &Params) -> Cost {
+        match params.text(&INFO, FILL.key) {
+            "cache" => cost::dais_cached(workload),
+            _ => cost::dais(workload),
+        }
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
