@@ -31,15 +31,28 @@ pub fn measure(
     chosen: &Chosen,
     workload: &Workload,
     frames: u32,
+    step: impl FnMut(),
+) -> Result<Measured, TechniqueError> {
+    measure_and(renderer, chosen, workload, frames, |_| Ok(()), step)
+}
+
+/// As [`measure`]; `read` sees the technique after its last frame, for what it has kept.
+pub fn measure_and(
+    renderer: &Renderer,
+    chosen: &Chosen,
+    workload: &Workload,
+    frames: u32,
+    read: impl FnOnce(&mut Prepared) -> Result<(), TechniqueError>,
     mut step: impl FnMut(),
 ) -> Result<Measured, TechniqueError> {
-    let mut run = || {
+    let run = || {
         let mut trial = Trial::start(renderer, chosen)?;
         step();
         for _ in 0..frames {
             trial.frame()?;
             step();
         }
+        read(&mut trial.prepared)?;
         trial.finish(chosen, workload)
     };
     match run() {

@@ -13,7 +13,7 @@ pub mod lights;
 mod load;
 mod model;
 mod obj;
-mod rng;
+pub mod rng;
 mod tangent;
 pub mod texture;
 

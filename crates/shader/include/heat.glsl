@@ -10,16 +10,28 @@ vec3 sample_usage_color(uint used, uint all) {
     return vec3(float(used - 1u) / float(max(all, 2u) - 1u), 0.0, 0.0);
 }
 
-// Black 0, blue 1, green 2, yellow 4, red 8, white 16 and more.
-vec3 invocations_color(uint count) {
+// Black 0, blue 1, green 2, yellow 3, red 4, white 5; straight between them.
+vec3 heat(float t) {
     const vec3 STOPS[6] = vec3[](vec3(0.0), vec3(0.0, 0.0, 0.6), vec3(0.0, 0.6, 0.1), vec3(0.9, 0.8, 0.0),
                                  vec3(0.8, 0.0, 0.0), vec3(1.0));
-    if (count == 0u) {
-        return STOPS[0];
-    }
-    float t = 1.0 + min(log2(float(count)), 4.0);
+    t = clamp(t, 0.0, 5.0);
     uint i = min(uint(t), 4u);
     return mix(STOPS[i], STOPS[i + 1u], t - float(i));
+}
+
+// Black 0, blue 1, green 2, yellow 4, red 8, white 16 and more.
+vec3 invocations_color(uint count) {
+    return count == 0u ? vec3(0.0) : heat(1.0 + log2(float(count)));
+}
+
+// Blue 1, green 2^4, yellow 2^8, red 2^12, white 2^16 and more.
+vec3 sharing_color(float log2_count) {
+    return heat(1.0 + log2_count / 4.0);
+}
+
+// Blue 1e-8 and less, green 1e-7, yellow 1e-6, red 1e-5, white 1e-4 and more.
+vec3 error_color(float error) {
+    return heat(1.0 + log2(max(error, 1e-8) / 1e-8) / log2(10.0));
 }
 
 #endif

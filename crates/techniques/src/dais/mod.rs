@@ -14,7 +14,8 @@ use crate::{
     cost::{self, Cost, Workload},
     dais_multirate::LowRate,
     multisample::{self, NO_TRIANGLE_RGBA8, Visible},
-    triangle_buffer,
+    triangle_buffer::{self, Records},
+    view,
 };
 
 /// The technique.
@@ -124,7 +125,7 @@ static INFO: Info = Info {
     needs: &[],
     samples: ANY_SAMPLES,
     tessellation: true,
-    views: multisample::VIEWS,
+    views: view::TRIANGLES,
 };
 
 impl Technique for Dais {
@@ -159,21 +160,28 @@ pub(crate) fn record(
     }
     let visible = Visible::find(graph, frame, info, frame.samples)?;
     let triangles = triangle_buffer::fill(graph, frame, info.id, &visible)?;
-    shade(graph, frame, info, rate, &format!("dais{}", visible.tag('-')), |pass| {
+    shade(graph, frame, info, rate, &format!("dais{}", visible.tag('-')), &triangles.records, |pass| {
         visible.bind(frame, pass);
         triangles.bind(pass);
     })
 }
 
-/// Declares the shading pass by the technique's parameters.
+/// Declares the shading pass by the technique's parameters or, where the frame shows a view of `records`, its passes; `bind` binds
+/// what `source` reads.
 pub(crate) fn shade(
     graph: &mut Graph,
     frame: &Frame<'_>,
     info: &'static Info,
     rate: Option<&LowRate>,
     source: &str,
-    bind: impl FnOnce(&mut ComputePass<'_>),
+    records: &Records,
+    bind: impl Fn(&mut ComputePass<'_>),
 ) -> Result<ImageHandle, TechniqueError> {
+    if view::is_of_triangles(frame.view) {
+        let samples = frame.samples;
+        return view::RecordSource { technique: info.id, tag: source, samples, records, bind: &bind }
+            .record(graph, frame);
+    }
     let source = format!("{source}{}", rate.map_or("", LowRate::tag));
     let lights = frame.params.text(info, multisample::LIGHTS.key);
     multisample::shade(graph, frame, info.id, (&source, frame.samples), lights, |pass| {
@@ -257,9 +265,9 @@ fn record_cached(
 
     let triangles = list.derivatives(graph, frame, info.id)?;
     let visible = Visible::Ids { ids: references, depth, samples: frame.samples };
-    let layout = if wide { "wide" } else { "refs" };
-    shade(graph, frame, info, rate, &format!("dais-{layout}{}", visible.tag('-')), |pass| {
+    let source = format!("dais-{}{}", if wide { "wide" } else { "refs" }, visible.tag('-'));
+    shade(graph, frame, info, rate, &source, &triangles, |pass| {
         visible.bind(frame, pass);
-        pass.read("TriangleBuffer", &triangles);
+        triangles.bind(pass);
     })
 }

@@ -12,7 +12,7 @@ use crate::{
     dais_multirate::{FULL_RATE, LowRate, SHARE},
     depth_prepass::FIRST_FRAGMENT,
     gbuffer_list::{self, NOT_TAKEN},
-    multisample, triangle_buffer,
+    multisample, triangle_buffer, view,
 };
 
 /// The technique.
@@ -58,7 +58,7 @@ static INFO: Info = Info {
     needs: &[Need { name: "post-depth coverage", test: |features| features.post_depth_coverage }],
     samples: MULTIPLE_SAMPLES,
     tessellation: true,
-    views: multisample::VIEWS,
+    views: view::TRIANGLES,
 };
 
 impl Technique for DaisList {
@@ -120,9 +120,9 @@ impl Technique for DaisList {
         let triangles = list.derivatives(graph, frame, INFO.id)?;
         frame.watch(graph, "nodes", &node_count, capacity, fixed.is_some());
         let rate = LowRate::chosen(frame, &INFO)?;
-        dais::shade(graph, frame, &INFO, rate.as_ref(), "dais-nodes", |pass| {
+        dais::shade(graph, frame, &INFO, rate.as_ref(), "dais-nodes", &triangles, |pass| {
             pass.read("gbuffer_depth", &depth).read("Heads", &heads).read("Nodes", &nodes);
-            pass.read("TriangleBuffer", &triangles);
+            triangles.bind(pass);
         })
     }
 }

@@ -10,7 +10,7 @@ use crate::{
     cost::{self, Cost, Workload},
     dais,
     graph::gpu,
-    multisample,
+    multisample, view,
 };
 
 /// The technique.
@@ -153,7 +153,7 @@ static INFO: Info = Info {
     needs: &[],
     samples: &[1, 2, 4, 8],
     tessellation: false,
-    views: multisample::VIEWS,
+    views: view::TRIANGLES,
 };
 
 impl Technique for DaisMultirate {

@@ -4,11 +4,7 @@
 // samples without a surface. Weights are samples; they and the background sum to SAMPLES.
 #include "shading.glsl"
 #include "heat.glsl"
-#include "multisample/samples.glsl"
-
-#ifndef SAMPLES_IN_KEYS
-layout(set = 0, binding = 8) uniform SAMPLED_IMAGE gbuffer_depth;
-#endif
+#include "multisample/sample_depth.glsl"
 
 #ifndef SOURCE_DEDUP
 // View distance of a sample's surface, negative without one: bounds of what a tile's lights must reach.
@@ -17,14 +13,6 @@ float source_distance(ivec2 pixel, uint i) {
     return depth == 0.0 ? -1.0 : distance_from_depth(depth);
 }
 #endif
-
-uint samples_without_surface(ivec2 pixel) {
-    uint count = 0u;
-    for (uint i = 0u; i < SAMPLES; ++i) {
-        count += SAMPLE_DEPTH(pixel, i) == 0.0 ? 1u : 0u;
-    }
-    return count;
-}
 
 #if defined(SOURCE_DEDUP)
 #include "multisample/source_dedup.glsl"

@@ -7,7 +7,7 @@
 // well, whatever lies behind the eye, and with det = sum b_i w_i it is 1/w = sum b_i / det and a/w = sum b_i a_i / det: equation 5
 // without a clip.
 //
-// In: the index, the scene. Out: TriangleBuffer. Dispatch: draws x 8; LISTED: as many as size.comp.glsl says.
+// In: the index, the scene. Out: TriangleBuffer; with RECORD_IDS the triangle ID of each record. Dispatch: draws x 8; LISTED: as many as size.comp.glsl says.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "triangle.glsl"
@@ -27,6 +27,11 @@ layout(set = 0, binding = 8, scalar) buffer TriangleBuffer {
 layout(set = 0, binding = 10, scalar) readonly buffer TriangleCount {
     uint triangles_needed;
     uint triangles_dropped;
+};
+#endif
+#ifdef RECORD_IDS
+layout(set = 0, binding = 15, scalar) writeonly buffer RecordIds {
+    uint record_ids[];
 };
 #endif
 #ifdef SAMPLES_IN_KEYS
@@ -222,6 +227,9 @@ void main() {
     uint draw = draw_commands[draw_slot * 5u + 4u];
 #else
     uint draw = draw_slot;
+#endif
+#ifdef RECORD_IDS
+    record_ids[index] = draw << TRIANGLE_BITS | triangle;
 #endif
     store_record(record, fetched_vertices(draw, triangle));
 #endif

@@ -6,7 +6,7 @@
 //! turn bits into places, and a thread a marked triangle writes its record. No lock, no cache, each triangle once, in the order
 //! of draws.
 
-use afterlight_graph::{BufferHandle, Graph, RasterPass};
+use afterlight_graph::{BufferHandle, ComputePass, Graph, RasterPass};
 
 use crate::{
     capacity,
@@ -14,6 +14,7 @@ use crate::{
     frame::{Frame, Slots},
     multisample::Visible,
     scene_gpu::DRAW_TRIANGLES,
+    view,
 };
 
 /// Triangles that the first frame of a view has room for: few, since that frame is run to count what the view needs.
@@ -23,9 +24,26 @@ const WORDS_A_DRAW: u64 = DRAW_TRIANGLES as u64 / 32;
 /// Triangles of a group: `local_size_x` in `derivatives.comp.glsl`.
 const GROUP_TRIANGLES: u32 = 128;
 
+/// Records of triangles.
+pub struct Records {
+    pub(crate) words: BufferHandle,
+    /// Triangle ID of each record, for the views that ask for it.
+    pub(crate) ids: Option<BufferHandle>,
+    /// Records that there is room for.
+    pub(crate) capacity: u32,
+}
+
+impl Records {
+    /// Binds what `triangle_buffer/interpolate.glsl` reads.
+    pub fn bind(&self, pass: &mut impl Slots) {
+        pass.read_buffer("TriangleBuffer", &self.words);
+    }
+}
+
 /// A filled triangle buffer with the index from triangles to their places.
 pub struct TriangleBuffer {
-    records: BufferHandle,
+    /// The triangles.
+    pub records: Records,
     bits: BufferHandle,
     before: BufferHandle,
     base: BufferHandle,
@@ -34,7 +52,7 @@ pub struct TriangleBuffer {
 impl TriangleBuffer {
     /// Binds what `triangle_buffer/index.glsl` and `triangle_buffer/interpolate.glsl` read.
     pub fn bind(&self, pass: &mut impl Slots) {
-        pass.read_buffer("TriangleBuffer", &self.records);
+        self.records.bind(pass);
         pass.read_buffer("VisibleBits", &self.bits);
         pass.read_buffer("VisibleBefore", &self.before);
         pass.read_buffer("DrawBase", &self.base);
@@ -95,7 +113,7 @@ impl List {
         graph: &mut Graph,
         frame: &Frame<'_>,
         technique: &str,
-    ) -> Result<BufferHandle, TechniqueError> {
+    ) -> Result<Records, TechniqueError> {
         let groups = graph.buffer(&format!("{technique}/dispatch groups"), 12);
         let shader = frame.shader("triangle_buffer/size.comp")?;
         let mut pass = frame.compute(graph, &format!("{technique}/size"), &shader);
@@ -105,16 +123,38 @@ impl List {
         pass.dispatch([1, 1, 1]);
         pass.finish();
 
+        let ids = RecordIds::wanted(graph, frame, technique, self.capacity);
         let stored = if frame.tessellate_px.is_some() { "vertices" } else { "list" };
-        let shader = frame.shader(&format!("triangle_buffer/derivatives.comp#{stored}"))?;
+        let shader = frame.shader(&format!("triangle_buffer/derivatives.comp#{stored}{}", ids.tag('-')))?;
         let mut pass = frame.compute(graph, &format!("{technique}/derivatives"), &shader);
         pass.constant("TRIANGLE_CAPACITY", self.capacity);
         pass.read("TriangleCount", &self.count);
-        let records = pass.write("TriangleBuffer", self.records);
+        let words = pass.write("TriangleBuffer", self.records);
+        let ids = ids.written_by(&mut pass);
         pass.dispatch_indirect(&groups, 0);
         pass.finish();
         frame.watch_with(graph, "triangles", &self.count, self.capacity, false, capacity::UNSTEADY);
-        Ok(records)
+        Ok(Records { words, ids, capacity: self.capacity })
+    }
+}
+
+/// Triangle IDs of records, written beside them where the frame's view compares records to what the rasteriser shows.
+struct RecordIds(Option<BufferHandle>);
+
+impl RecordIds {
+    fn wanted(graph: &mut Graph, frame: &Frame<'_>, technique: &str, capacity: u32) -> Self {
+        let wanted = view::compares_triangles(frame.view) && frame.tessellate_px.is_none();
+        let bytes = 4 * u64::from(capacity.max(1));
+        Self(wanted.then(|| graph.buffer(&format!("{technique}/record ids"), bytes)))
+    }
+
+    /// Tag of the derivative pass's variant, with a separator before it; empty without IDs.
+    fn tag(&self, separator: char) -> String {
+        self.0.as_ref().map_or_else(String::new, |_| format!("{separator}ids"))
+    }
+
+    fn written_by(self, pass: &mut ComputePass<'_>) -> Option<BufferHandle> {
+        self.0.map(|ids| pass.write("RecordIds", ids))
     }
 }
 
@@ -146,17 +186,7 @@ pub fn fill(
     visible: &Visible,
 ) -> Result<TriangleBuffer, TechniqueError> {
     let name = |stage: &str| format!("{technique}/{stage}");
-    let draws = (frame.scene.draw_count() as u32).max(1);
-    let (capacity, bytes) = room(frame, technique)?;
-    let words = u64::from(draws) * WORDS_A_DRAW;
-    let bits = graph.buffer(&name("visible bits"), 4 * words);
-    let before = graph.buffer(&name("visible before"), 4 * words);
-    let of_draw = graph.buffer(&name("visible of draw"), 4 * u64::from(draws));
-    let base = graph.buffer(&name("draw base"), 4 * u64::from(draws));
-    let count = graph.buffer(&name("triangle count"), 8);
-    let records = graph.buffer(&name("triangle buffer"), bytes);
-    let bits = graph.clear_buffer(&name("clear bits"), bits, 0);
-
+    let bits = bits(graph, frame, technique, 0);
     let shader = frame.shader(&format!("triangle_buffer/mark.comp{}", visible.tag('#')))?;
     let mut pass = frame.compute(graph, &name("mark"), &shader);
     pass.constant("SAMPLES", visible.samples());
@@ -164,6 +194,41 @@ pub fn fill(
     let bits = pass.write("MarkedBits", bits);
     pass.dispatch(frame.groups(8));
     pass.finish();
+    store_marked(graph, frame, technique, bits, matches!(visible, Visible::Keys { .. }))
+}
+
+/// Draws of the scene, at least one.
+fn draw_count(frame: &Frame<'_>) -> u32 {
+    (frame.scene.draw_count() as u32).max(1)
+}
+
+/// Declares a bit for each triangle of the scene, 1,024 a draw, 32 of them the word `value`.
+pub fn bits(graph: &mut Graph, frame: &Frame<'_>, technique: &str, value: u32) -> BufferHandle {
+    let bytes = 4 * u64::from(draw_count(frame)) * WORDS_A_DRAW;
+    let bits = graph.buffer(&format!("{technique}/visible bits"), bytes);
+    graph.clear_buffer(&format!("{technique}/clear bits"), bits, value)
+}
+
+/// Declares the passes that store every triangle whose bit is set; `by_keys`: bits stand in the order of draws instead of that
+/// of triangle IDs.
+///
+/// # Errors
+/// More triangles than one binding holds.
+pub fn store_marked(
+    graph: &mut Graph,
+    frame: &Frame<'_>,
+    technique: &str,
+    bits: BufferHandle,
+    by_keys: bool,
+) -> Result<TriangleBuffer, TechniqueError> {
+    let name = |stage: &str| format!("{technique}/{stage}");
+    let draws = draw_count(frame);
+    let (capacity, bytes) = room(frame, technique)?;
+    let before = graph.buffer(&name("visible before"), 4 * u64::from(draws) * WORDS_A_DRAW);
+    let of_draw = graph.buffer(&name("visible of draw"), 4 * u64::from(draws));
+    let base = graph.buffer(&name("draw base"), 4 * u64::from(draws));
+    let count = graph.buffer(&name("triangle count"), 8);
+    let words = graph.buffer(&name("triangle buffer"), bytes);
 
     let mut pass = frame.compute(graph, &name("count"), &frame.shader("triangle_buffer/count.comp")?);
     pass.constant("DRAWS", draws);
@@ -181,16 +246,17 @@ pub fn fill(
     pass.dispatch([1, 1, 1]);
     pass.finish();
 
-    let by_keys = matches!(visible, Visible::Keys { .. });
-    let shader =
-        if by_keys { "triangle_buffer/derivatives.comp#keys" } else { "triangle_buffer/derivatives.comp" };
-    let mut pass = frame.compute(graph, &name("derivatives"), &frame.shader(shader)?);
+    let ids = RecordIds::wanted(graph, frame, technique, capacity);
+    let tag = if by_keys { format!("#keys{}", ids.tag('-')) } else { ids.tag('#') };
+    let shader = frame.shader(&format!("triangle_buffer/derivatives.comp{tag}"))?;
+    let mut pass = frame.compute(graph, &name("derivatives"), &shader);
     pass.constant("TRIANGLE_CAPACITY", capacity);
     pass.read("VisibleBits", &bits).read("VisibleBefore", &before).read("DrawBase", &base);
     if by_keys {
         pass.read("DrawCommands", &frame.buffers.commands);
     }
-    let records = pass.write("TriangleBuffer", records);
+    let words = pass.write("TriangleBuffer", words);
+    let ids = ids.written_by(&mut pass);
     let most_groups = frame.features().max_workgroup_count[0];
     for first in (0..draws).step_by(most_groups as usize) {
         pass.push(&[first]);
@@ -199,5 +265,5 @@ pub fn fill(
     pass.finish();
 
     frame.watch(graph, "triangles", &count, capacity, false);
-    Ok(TriangleBuffer { records, bits, before, base })
+    Ok(TriangleBuffer { records: Records { words, ids, capacity }, bits, before, base })
 }

@@ -2,6 +2,10 @@
 //!
 //! A view is an image of display colours in place of radiance; it is shown without tone mapping.
 
+mod records;
+
+pub use records::{ATTRIBUTE_ERRORS, RecordSource};
+
 use afterlight_graph::{Graph, ImageHandle, RasterPass, gpu::vk};
 
 use crate::{error::TechniqueError, frame::Frame};
@@ -17,6 +21,29 @@ pub const SAMPLE_USAGE: &str = "sample-usage";
 pub const EDGES: &str = "edges";
 /// Pixels whose weights sum to more than the number of samples: red; to less: blue; others are black.
 pub const WEIGHTS: &str = "weights";
+
+/// Visibility samples of the image that refer to the same triangle's record (Schied and Dachsbacher 2015, Figure 1, right).
+pub const TRIANGLE_SHARING: &str = "triangle-sharing";
+/// Distance of positions from triangle records to those that the rasteriser interpolates (Schied and Dachsbacher 2015,
+/// Figure 6, left).
+pub const ATTRIBUTE_ERROR: &str = "attribute-error";
+/// Difference of base colours that are looked up by texture coordinates from triangle records and by the rasteriser's
+/// (Schied and Dachsbacher 2015, Figure 6, right).
+pub const TEXTURE_ERROR: &str = "texture-error";
+
+/// Views of techniques whose samples refer to records of a triangle buffer.
+pub const TRIANGLES: &[&str] =
+    &[SAMPLE_USAGE, INVOCATIONS, EDGES, WEIGHTS, TRIANGLE_SHARING, ATTRIBUTE_ERROR, TEXTURE_ERROR];
+
+/// Whether a view is one of [`RecordSource`].
+pub fn is_of_triangles(view: &str) -> bool {
+    view == TRIANGLE_SHARING || compares_triangles(view)
+}
+
+/// Whether a view compares triangle records to what the rasteriser shows.
+pub fn compares_triangles(view: &str) -> bool {
+    [ATTRIBUTE_ERROR, TEXTURE_ERROR].contains(&view)
+}
 
 /// Number of a view in `multisample/shade.glsl`.
 pub fn number(view: &str) -> u32 {

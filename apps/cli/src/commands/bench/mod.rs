@@ -1,6 +1,7 @@
 //! `afterlight bench`: the experiments, a file each.
 
 mod antialiasing;
+mod dais_fig6;
 mod msaa_table1;
 mod msaa_table2;
 mod speed;
@@ -33,8 +34,13 @@ struct Experiment {
 }
 
 /// All experiments, in the order of `bench all`.
-const EXPERIMENTS: &[Experiment] =
-    &[speed::EXPERIMENT, msaa_table1::EXPERIMENT, msaa_table2::EXPERIMENT, antialiasing::EXPERIMENT];
+const EXPERIMENTS: &[Experiment] = &[
+    speed::EXPERIMENT,
+    msaa_table1::EXPERIMENT,
+    msaa_table2::EXPERIMENT,
+    antialiasing::EXPERIMENT,
+    dais_fig6::EXPERIMENT,
+];
 
 /// What an experiment found.
 struct Outcome {

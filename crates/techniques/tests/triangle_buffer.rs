@@ -1,0 +1,517 @@
+//! Attributes from triangle records: a million random triangles against f64, those that reach behind the eye included.
+
+mod common;
+
+use std::path::{Path, PathBuf};
+
+use afterlight_oracle::packing::unpack_normal;
+use afterlight_techniques::{
+    Frame, Info, Params, Renderer, SceneGpu, Settings, Technique, TechniqueError,
+    cost::{Cost, Workload},
+    find,
+    graph::{Graph, ImageHandle, gpu, gpu::vk},
+    scene::{Aabb, Camera, Instance, Material, Mesh, Node, Scene, VertexAttributes, rng::SplitMix64},
+    shader::{Shader, compile::Compiler, manifest},
+    triangle_buffer,
+};
+use glam::{Affine3A, DMat4, DVec2, DVec3, DVec4, Vec3};
+
+/// Triangles of a draw; every draw is full, so that bits, IDs and places are one.
+const DRAW_TRIANGLES: usize = 1024;
+const DRAWS: usize = 977;
+const TRIANGLES: usize = DRAWS * DRAW_TRIANGLES;
+const SIZE_PX: (u32, u32) = (1920, 1080);
+/// Half of the spacing of floats at 1.
+const U: f64 = 1.0 / 16_777_216.0;
+
+/// What a triangle is like.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Class {
+    /// In front of the eye, from a pixel to larger than the image.
+    Front,
+    OneBehind,
+    TwoBehind,
+    /// A ten-thousandth to a tenth as high as wide.
+    Sliver,
+    /// 200 m to 20 km away, a pixel to 64 large.
+    Far,
+    /// Seen at 6 degrees to a hundredth of a degree.
+    Grazing,
+}
+
+const CLASSES: [Class; 6] =
+    [Class::Front, Class::OneBehind, Class::TwoBehind, Class::Sliver, Class::Far, Class::Grazing];
+
+fn class_of(triangle: usize) -> Class {
+    CLASSES[triangle % CLASSES.len()]
+}
+
+/// A random number in [0, 1).
+fn unit(rng: &mut SplitMix64) -> f64 {
+    rng.next_f32().into()
+}
+
+/// A random number of even logarithm.
+fn log_between(rng: &mut SplitMix64, low: f64, high: f64) -> f64 {
+    low * (high / low).powf(unit(rng))
+}
+
+fn direction(rng: &mut SplitMix64) -> DVec3 {
+    loop {
+        let v = DVec3::new(unit(rng), unit(rng), unit(rng)) * 2.0 - 1.0;
+        if (1e-6..1.0).contains(&v.length_squared()) {
+            return v.normalize();
+        }
+    }
+}
+
+/// The view of the triangles.
+struct View {
+    camera: Camera,
+    clip_from_world: DMat4,
+    world_from_view: DMat4,
+    /// View coordinates at a distance of 1 m of the image's right and lower edge.
+    half: DVec2,
+}
+
+impl View {
+    fn new() -> Self {
+        let eye = Vec3::new(3.1, -2.3, 5.7);
+        let camera = Camera::look_at("test", eye, eye + Vec3::new(-0.6, 0.3, -0.8), 1.1, 0.1);
+        let aspect = SIZE_PX.0 as f32 / SIZE_PX.1 as f32;
+        // What the device is given: screen positions are defined by it.
+        let clip_from_world = (camera.clip_from_view(aspect) * camera.view_from_world()).as_dmat4();
+        let half_height = (0.55f64).tan();
+        Self {
+            world_from_view: camera.view_from_world().as_dmat4().inverse(),
+            clip_from_world,
+            half: DVec2::new(half_height * f64::from(aspect), half_height),
+            camera,
+        }
+    }
+
+    fn ndc(pixel: DVec2) -> DVec2 {
+        (pixel + 0.5) * 2.0 / DVec2::new(SIZE_PX.0.into(), SIZE_PX.1.into()) - 1.0
+    }
+}
+
+/// A triangle of a class that covers a pixel.
+struct Triangle {
+    position_ws: [Vec3; 3],
+    normal: [u32; 3],
+    uv: [[f32; 2]; 3],
+    pixel: [u32; 2],
+}
+
+/// Corners in view space of a triangle around a point that a ray meets at `distance_m`.
+fn corners(rng: &mut SplitMix64, class: Class, ray: DVec3, half: DVec2) -> [DVec3; 3] {
+    let distance_m = match class {
+        Class::Far => log_between(rng, 200.0, 20_000.0),
+        _ => log_between(rng, 0.2, 100.0),
+    };
+    let pixel_m = distance_m * 2.0 * half.y / f64::from(SIZE_PX.1);
+    let size_m = match class {
+        Class::Front | Class::Sliver | Class::Grazing => log_between(rng, pixel_m, 2.0 * distance_m),
+        Class::Far => log_between(rng, pixel_m, 64.0 * pixel_m),
+        Class::OneBehind | Class::TwoBehind => log_between(rng, 1.5 * distance_m, 30.0 * distance_m),
+    };
+    let first = direction(rng);
+    let mut second = direction(rng);
+    if class == Class::Sliver {
+        second = (first + second * log_between(rng, 1e-4, 1e-1)) * (0.3 + unit(rng));
+    }
+    if class == Class::Grazing {
+        // An edge along the ray, but for the angle.
+        second = ray.normalize() + second * log_between(rng, 2e-4, 1e-1);
+    }
+    let (first, second) = (first * size_m, second * size_m);
+    let (mut b, mut c) = (unit(rng), unit(rng));
+    if b + c > 1.0 {
+        (b, c) = (1.0 - b, 1.0 - c);
+    }
+    let corner = ray * distance_m - first * b - second * c;
+    [corner, corner + first, corner + second]
+}
+
+fn triangle(rng: &mut SplitMix64, class: Class, view: &View) -> Triangle {
+    let pixel = [SIZE_PX.0, SIZE_PX.1].map(|size| ((unit(rng) * f64::from(size)) as u32).min(size - 1));
+    let ndc = View::ndc(DVec2::new(pixel[0].into(), pixel[1].into()));
+    let ray = DVec3::new(ndc.x * view.half.x, -ndc.y * view.half.y, -1.0);
+    let behind = match class {
+        Class::OneBehind => 1,
+        Class::TwoBehind => 2,
+        _ => 0,
+    };
+    let corners = loop {
+        let corners = corners(rng, class, ray, view.half);
+        if corners.iter().filter(|p| p.z > 0.0).count() == behind {
+            break corners;
+        }
+    };
+    let mut bits = || (rng.next_u64() >> 32) as u32;
+    let normal = [bits(), bits(), bits()];
+    let uv = [(); 3].map(|()| [rng.between(-4.0, 4.0), rng.between(-4.0, 4.0)]);
+    Triangle {
+        position_ws: corners.map(|p| view.world_from_view.transform_point3(p).as_vec3()),
+        normal,
+        uv,
+        pixel,
+    }
+}
+
+fn triangles(view: &View) -> Vec<Triangle> {
+    let mut rng = SplitMix64::new(7);
+    (0..TRIANGLES).map(|i| triangle(&mut rng, class_of(i), view)).collect()
+}
+
+fn scene_of(triangles: &[Triangle], view: &View) -> Scene {
+    let attributes = |t: &Triangle, k: usize| VertexAttributes {
+        normal_os_oct: t.normal[k],
+        tangent_os_oct: 0,
+        uv0: t.uv[k].map(f32::to_bits),
+        uv1: [0; 2],
+        color_rgba8: u32::MAX,
+    };
+    let bounds_of = |triangles: &[Triangle]| {
+        let mut bounds = Aabb::EMPTY;
+        triangles.iter().flat_map(|t| t.position_ws).for_each(|p| bounds.extend(p));
+        bounds
+    };
+    let corners = 3 * DRAW_TRIANGLES as u32;
+    let mesh = |(i, triangles): (usize, &[Triangle])| Mesh {
+        name: String::new(),
+        first_index: 0,
+        index_count: corners,
+        first_vertex: i as u32 * corners,
+        vertex_count: corners,
+        material: 0,
+        bounds_os: bounds_of(triangles),
+    };
+    Scene {
+        positions_os: triangles.iter().flat_map(|t| t.position_ws.map(Vec3::to_array)).collect(),
+        attributes: triangles.iter().flat_map(|t| [0, 1, 2].map(|k| attributes(t, k))).collect(),
+        indices: (0..corners).collect(),
+        meshes: triangles.chunks(DRAW_TRIANGLES).enumerate().map(mesh).collect(),
+        nodes: vec![Node::default()],
+        instances: (0..DRAWS as u32)
+            .map(|mesh| Instance { mesh, node: 0, world_from_object: Affine3A::IDENTITY })
+            .collect(),
+        materials: vec![Material { double_sided: true, ..Material::default() }],
+        cameras: vec![view.camera.clone()],
+        ..Scene::default()
+    }
+}
+
+/// Compiles a shader of this crate or of its tests, with a part of its text replaced.
+fn compiled(name: &str, path: &Path, replaced: Option<(&str, &str)>) -> Shader {
+    let mut text = std::fs::read_to_string(path).expect("a shader");
+    if let Some((from, to)) = replaced {
+        assert!(text.contains(from), "{name} has changed: found no {from:?}");
+        text = text.replace(from, to);
+    }
+    let file = path.file_name().expect("a file").to_str().expect("a name");
+    let written = std::env::temp_dir().join(format!("afterlight-{}-{file}", std::process::id()));
+    std::fs::write(&written, text).expect("a file in the temporary folder");
+    let variant = manifest::Variant {
+        name: name.to_owned(),
+        stage: manifest::stage_of(file).expect("a stage"),
+        path: written.clone(),
+        folder: sources(),
+        defines: Vec::new(),
+    };
+    let found = Compiler::new().include_dir(sources()).compile(&variant).unwrap_or_else(|e| panic!("{e}"));
+    std::fs::remove_file(&written).expect("the file");
+    found.shader
+}
+
+fn sources() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
+}
+
+/// Records of all triangles, and what they give at a pixel each.
+struct Records {
+    /// Pixel of each triangle, 2 × 16 bits.
+    pixels: Vec<u32>,
+}
+
+impl Technique for Records {
+    fn info(&self) -> &Info {
+        find("dais").expect("known").info()
+    }
+    fn predict(&self, _: &Workload, _: &Params) -> Cost {
+        Cost::default()
+    }
+    fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
+        let bits = triangle_buffer::bits(graph, frame, "test", u32::MAX);
+        let triangles = triangle_buffer::store_marked(graph, frame, "test", bits, false)?;
+        let pixels = frame.table(graph, "test/pixels", &self.pixels)?;
+        let found = graph.buffer("test/found", 48 * TRIANGLES as u64);
+        let mut pass = frame.compute(graph, "test/attributes", &frame.shader("test/attributes.comp")?);
+        triangles.records.bind(&mut pass);
+        pass.read("Pixels", &pixels);
+        let found = pass.write("Found", found);
+        pass.dispatch([TRIANGLES as u32 / 128, 1, 1]);
+        pass.finish();
+        graph.keep(&found);
+        let radiance = graph.image("test/radiance", frame.image_info(vk::Format::R16G16B16A16_SFLOAT));
+        Ok(graph.clear_image("test/clear", radiance, [0.0; 4]))
+    }
+}
+
+/// What the device finds, twelve floats a triangle, with the derivative pass as it is or a mutant of it.
+fn on_device(
+    device: &gpu::Device,
+    uploaded: &std::sync::Arc<SceneGpu>,
+    settings: &Settings,
+    technique: &Records,
+    mutant: Option<(&str, &str)>,
+) -> Vec<f32> {
+    let tests = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests");
+    let mut renderer =
+        Renderer::with_scene(device, uploaded.clone(), settings).unwrap_or_else(|e| panic!("{e}"));
+    renderer.add_shaders([compiled("test/attributes.comp", &tests.join("attributes.comp.glsl"), None)]);
+    if mutant.is_some() {
+        let name = "triangle_buffer/derivatives.comp";
+        renderer.add_shaders([compiled(name, &sources().join(format!("{name}.glsl")), mutant)]);
+    }
+    let mut prepared = renderer.prepare(technique, &Params::default()).unwrap_or_else(|e| panic!("{e}"));
+    prepared.run().unwrap_or_else(|e| panic!("{e}"));
+    let bytes = prepared.executor().read_buffer("test/found").unwrap_or_else(|e| panic!("{e}"));
+    bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()
+}
+
+/// A clip position's x, y, w, and the sums of the magnitudes that each is the sum of.
+struct Clip {
+    at: DVec3,
+    terms: DVec3,
+}
+
+fn clip(m: &DMat4, p: Vec3) -> Clip {
+    let p = p.as_dvec3().extend(1.0);
+    let pick = |v: DVec4| DVec3::new(v.x, v.y, v.w);
+    let abs = DMat4::from_cols(m.x_axis.abs(), m.y_axis.abs(), m.z_axis.abs(), m.w_axis.abs());
+    Clip { at: pick(*m * p), terms: pick(abs * p.abs()) }
+}
+
+/// A scalar attribute in f64, and how far rounding to floats may move it, in units of [`U`].
+#[derive(Clone, Copy)]
+struct Exact {
+    value: f64,
+    slack: f64,
+}
+
+/// A triangle's interpolation at a pixel in f64.
+///
+/// Slack is the first-order effect of what floats lose: each clip coordinate moves by its terms' magnitudes, products and sums
+/// by theirs. The part of the clip coordinates is there in any rasteriser of floats as well.
+struct Oracle {
+    /// Edge functions at the pixel over their sum: perspective-correct barycentric coordinates.
+    at: [f64; 3],
+    /// Their changes a pixel.
+    dx: [f64; 3],
+    dy: [f64; 3],
+    /// Magnitude of the error of each edge function over their sum, and of its changes.
+    edge_slack: [f64; 3],
+    change_slack: [f64; 3],
+    /// Magnitudes of the products that edge functions and their changes are sums of.
+    edge_terms: [f64; 3],
+    change_terms: [f64; 3],
+    /// Changes a pixel of the sum of edge functions, over it.
+    sum_change: f64,
+    w: [f64; 3],
+    w_terms: [f64; 3],
+}
+
+fn cross(a: DVec2, b: DVec2) -> f64 {
+    a.x * b.y - a.y * b.x
+}
+
+/// The anchor of `derivatives.comp.glsl`.
+fn anchor_px(c: &[Clip; 3]) -> DVec2 {
+    let size = DVec2::new(SIZE_PX.0.into(), SIZE_PX.1.into());
+    let seen = c.iter().filter(|c| c.at.z > 0.0);
+    let px = |c: &Clip| ((c.at.truncate() / c.at.z * 0.5 + 0.5) * size).clamp(DVec2::ZERO, size);
+    (seen.clone().map(px).sum::<DVec2>() / seen.count() as f64).floor()
+}
+
+impl Oracle {
+    fn new(view: &View, t: &Triangle) -> Option<Self> {
+        let c = t.position_ws.map(|p| clip(&view.clip_from_world, p));
+        let pixel = DVec2::new(t.pixel[0].into(), t.pixel[1].into());
+        let (ndc, anchor) = (View::ndc(pixel), View::ndc(anchor_px(&c)));
+        let step = DVec2::new(2.0 / f64::from(SIZE_PX.0), 2.0 / f64::from(SIZE_PX.1));
+        let w = [0, 1, 2].map(|i| c[i].at.z);
+        let q = [0, 1, 2].map(|i| c[i].at.truncate() - ndc * w[i]);
+        let others = [(1, 2), (2, 0), (0, 1)];
+        let b = others.map(|(j, k)| cross(q[j], q[k]));
+        let sum: f64 = b.iter().sum();
+        let det: f64 = (0..3).map(|i| b[i] * w[i]).sum();
+        if sum == 0.0 || det == 0.0 {
+            return None;
+        }
+        let bx = others.map(|(j, k)| (w[k] * q[j].y - w[j] * q[k].y) * step.x);
+        let by = others.map(|(j, k)| (w[j] * q[k].x - w[k] * q[j].x) * step.y);
+        let (sum_dx, sum_dy) = (bx.iter().sum::<f64>() / sum, by.iter().sum::<f64>() / sum);
+        let at = b.map(|b| b / sum);
+
+        // Reach of q between anchor and pixel, what it moves by, and the same of w.
+        let reach = [0, 1, 2].map(|i| {
+            let from_anchor = (ndc - anchor).abs().max_element() * w[i].abs();
+            (c[i].at.truncate() - anchor * w[i]).abs().max_element() + from_anchor
+        });
+        let w_terms = [0, 1, 2].map(|i| c[i].terms.z);
+        let moved = [0, 1, 2].map(|i| {
+            let ndc = anchor.abs().max_element().max(ndc.abs().max_element());
+            c[i].terms.truncate().max_element() + ndc * w_terms[i]
+        });
+        let over_sum = |value: f64| value / sum.abs();
+        let pixel_step = step.max_element();
+        Some(Self {
+            dx: [0, 1, 2].map(|i| bx[i] / sum - at[i] * sum_dx),
+            dy: [0, 1, 2].map(|i| by[i] / sum - at[i] * sum_dy),
+            at,
+            edge_slack: others.map(|(j, k)| over_sum(reach[j] * moved[k] + moved[j] * reach[k])),
+            change_slack: others.map(|(j, k)| {
+                let of_w = w_terms[k] * reach[j] + w_terms[j] * reach[k];
+                over_sum(pixel_step * (of_w + w[k].abs() * moved[j] + w[j].abs() * moved[k]))
+            }),
+            edge_terms: others.map(|(j, k)| over_sum(2.0 * reach[j] * reach[k])),
+            change_terms: others
+                .map(|(j, k)| over_sum(pixel_step * (w[k].abs() * reach[j] + w[j].abs() * reach[k]))),
+            sum_change: sum_dx.abs().max(sum_dy.abs()),
+            w,
+            w_terms,
+        })
+    }
+
+    fn sum(weights: &[f64; 3], of: impl Fn(usize) -> f64) -> f64 {
+        (0..3).map(|i| weights[i] * of(i)).sum()
+    }
+
+    fn value(&self, a: [f64; 3]) -> Exact {
+        let value = Self::sum(&self.at, |i| a[i]);
+        let slack = Self::sum(&self.edge_slack, |i| (a[i] - value).abs())
+            + Self::sum(&self.edge_terms, |i| a[i].abs() + value.abs());
+        Exact { value, slack }
+    }
+
+    /// Changes along x and y.
+    fn changes(&self, a: [f64; 3]) -> [Exact; 2] {
+        let of = self.value(a);
+        let slack = Self::sum(&self.change_slack, |i| (a[i] - of.value).abs())
+            + Self::sum(&self.change_terms, |i| a[i].abs() + of.value.abs())
+            + of.slack * self.sum_change;
+        [self.dx, self.dy].map(|d| Exact { value: Self::sum(&d, |i| a[i]), slack })
+    }
+
+    /// World position; its slack is that of the distance along the ray from the eye.
+    fn position(&self, t: &Triangle, eye_ws: DVec3) -> (DVec3, f64) {
+        let p = (0..3).map(|i| t.position_ws[i].as_dvec3() * self.at[i]).sum::<DVec3>();
+        let w = Self::sum(&self.at, |i| self.w[i]);
+        let of_w = Self::sum(&self.edge_slack, |i| (self.w[i] - w).abs())
+            + Self::sum(&self.edge_terms, |i| self.w_terms[i] + w.abs());
+        (p, of_w / w.abs() * p.distance(eye_ws) + p.length() + eye_ws.length())
+    }
+}
+
+/// Largest and mean of an error.
+#[derive(Clone, Copy, Default)]
+struct Errors {
+    max: f64,
+    sum: f64,
+    count: f64,
+    /// Largest share of what rounding may do.
+    of_slack: f64,
+}
+
+impl Errors {
+    fn add(&mut self, error: f64, scale: f64, slack: f64) {
+        let error = if error.is_nan() { f64::INFINITY } else { error };
+        self.max = self.max.max(error / scale);
+        self.sum += error / scale;
+        self.count += 1.0;
+        self.of_slack = self.of_slack.max(error / (U * slack));
+    }
+    fn mean(&self) -> f64 {
+        self.sum / self.count
+    }
+}
+
+const ATTRIBUTES: [&str; 4] = ["position", "normal", "texture coordinates", "their changes"];
+
+/// Errors by class and attribute. Positions: over the distance to the eye; normals and texture coordinates: over the range of the
+/// attribute's values at the vertices; changes: over their magnitude.
+fn errors(view: &View, triangles: &[Triangle], found: &[f32]) -> [[Errors; 4]; CLASSES.len()] {
+    let mut errors = [[Errors::default(); 4]; CLASSES.len()];
+    let eye_ws = view.camera.eye_ws().as_dvec3();
+    for (index, (t, found)) in triangles.iter().zip(found.chunks_exact(12)).enumerate() {
+        let Some(oracle) = Oracle::new(view, t) else { continue };
+        let found: Vec<f64> = found.iter().map(|f| f64::from(*f)).collect();
+        let [position, normal, uv, changes] = &mut errors[index % CLASSES.len()];
+        let (p, slack) = oracle.position(t, eye_ws);
+        position.add(p.distance(DVec3::new(found[0], found[1], found[2])), p.distance(eye_ws), slack);
+        let normals = t.normal.map(unpack_normal);
+        for axis in 0..3 {
+            let a = normals.map(|n| n[axis]);
+            let exact = oracle.value(a);
+            normal.add((found[3 + axis] - exact.value).abs(), range(a), exact.slack);
+        }
+        for axis in 0..2 {
+            let a = t.uv.map(|uv| f64::from(uv[axis]));
+            let exact = oracle.value(a);
+            uv.add((found[6 + axis] - exact.value).abs(), range(a), exact.slack);
+            let exact = oracle.changes(a);
+            let magnitude = exact[0].value.hypot(exact[1].value);
+            for (k, exact) in exact.into_iter().enumerate() {
+                changes.add((found[8 + 2 * k + axis] - exact.value).abs(), magnitude, exact.slack);
+            }
+        }
+    }
+    errors
+}
+
+fn range(a: [f64; 3]) -> f64 {
+    a.iter().copied().fold(f64::MIN, f64::max) - a.iter().copied().fold(f64::MAX, f64::min)
+}
+
+fn print(what: &str, errors: &[[Errors; 4]; CLASSES.len()]) {
+    for (class, errors) in CLASSES.iter().zip(errors) {
+        for (attribute, e) in ATTRIBUTES.iter().zip(errors) {
+            println!(
+                "{what}, {class:?}, {attribute}: max {:.2e}, mean {:.2e}, {:.3} of what rounding may do",
+                e.max,
+                e.mean(),
+                e.of_slack
+            );
+        }
+    }
+}
+
+fn largest_share(errors: &[[Errors; 4]; CLASSES.len()]) -> f64 {
+    errors.iter().flatten().map(|e| e.of_slack).fold(0.0, f64::max)
+}
+
+#[test]
+fn attributes_of_a_million_triangles_agree_with_f64() {
+    let gpu = afterlight_testkit::gpu();
+    let view = View::new();
+    let start = std::time::Instant::now();
+    let triangles = triangles(&view);
+    let scene = scene_of(&triangles, &view);
+    println!("made {:?}", start.elapsed());
+    let uploaded = SceneGpu::upload(&gpu, &scene, &|_, _| {}).unwrap_or_else(|e| panic!("{e}"));
+    println!("uploaded {:?}", start.elapsed());
+    let settings = Settings::for_scene(&scene, SIZE_PX.0, SIZE_PX.1);
+    let technique = Records { pixels: triangles.iter().map(|t| t.pixel[0] | t.pixel[1] << 16).collect() };
+    let with = |mutant| errors(&view, &triangles, &on_device(&gpu, &uploaded, &settings, &technique, mutant));
+
+    let found = with(None);
+    println!("found {:?}", start.elapsed());
+    print("as it is", &found);
+    let at_center = with(Some(("vec2 anchor = anchor_px(c0, c1, c2);", "vec2 anchor = vec2(frame.size_px / 2u);")));
+    print("anchor at the image's centre", &at_center);
+    let swapped = with(Some(("by * (inverse_det * pixel_ndc.y)", "by * (inverse_det * -pixel_ndc.y)")));
+    print("a sign swapped", &swapped);
+    println!("done {:?}", start.elapsed());
+    println!("shares {} {} {}", largest_share(&found), largest_share(&at_center), largest_share(&swapped));
+}
