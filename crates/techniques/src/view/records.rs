@@ -3,13 +3,7 @@
 use afterlight_graph::{ComputePass, Graph, ImageHandle, Load, gpu::vk};
 
 use super::TEXTURE_ERROR;
-use crate::{
-    error::TechniqueError,
-    frame::Frame,
-    geometry::Surfaces,
-    scene::Aabb,
-    triangle_buffer::Records,
-};
+use crate::{error::TechniqueError, frame::Frame, geometry::Surfaces, scene::Aabb, triangle_buffer::Records};
 
 /// Name, after the technique's, of the buffer of errors that [`RecordSource::record`] keeps: two 32-bit floats a
 /// pixel, rows from the top. Distance of the positions in a scene whose longest side is 2; largest difference of a channel of
@@ -104,9 +98,8 @@ impl RecordSource<'_> {
 
     /// World position with triangle ID, and base colour, of what shows at pixel centres.
     fn reference(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<[ImageHandle; 2], TechniqueError> {
-        let image = |graph: &mut Graph, name: &str, format| {
-            graph.image(&self.name(name), frame.image_info(format))
-        };
+        let image =
+            |graph: &mut Graph, name: &str, format| graph.image(&self.name(name), frame.image_info(format));
         let position = image(graph, "reference position", vk::Format::R32G32B32A32_UINT);
         let color = image(graph, "reference color", vk::Format::R32G32B32A32_SFLOAT);
         let depth = image(graph, "reference depth", vk::Format::D32_SFLOAT);

@@ -24,8 +24,11 @@ use crate::session::{self, Session};
 use crate::text;
 
 /// The experiment.
-pub(super) const EXPERIMENT: Experiment =
-    Experiment { name: "dais-fig6", summary: "attributes from triangle records against the rasteriser's", run };
+pub(super) const EXPERIMENT: Experiment = Experiment {
+    name: "dais-fig6",
+    summary: "attributes from triangle records against the rasteriser's",
+    run,
+};
 
 /// What the paper says of it.
 const PAPER: &str = "images alone, no figures; the error grows with distance and at shallow angles";
@@ -137,7 +140,8 @@ fn setups(args: &BenchArgs, samples: u32) -> Result<Vec<Setup>, Failure> {
         .filter(|info| info.views.contains(&view::ATTRIBUTE_ERROR))
         .map(|info| info.id)
         .collect();
-    let ids: Vec<String> = match args.given.techniques && args.techniques.iter().all(|id| id.trim() != "all") {
+    let ids: Vec<String> = match args.given.techniques && args.techniques.iter().all(|id| id.trim() != "all")
+    {
         true => args.techniques.clone(),
         false => having.iter().map(|id| (*id).to_owned()).collect(),
     };
@@ -228,7 +232,8 @@ fn notes(args: &BenchArgs, common: &CommonArgs) -> Vec<String> {
         format!("the paper: {PAPER}"),
     ];
     if !args.given.scenes {
-        notes.push("the built-in scene stands in for the paper's Sponza and San Miguel (--scenes)".to_owned());
+        notes
+            .push("the built-in scene stands in for the paper's Sponza and San Miguel (--scenes)".to_owned());
     }
     if (common.width, common.height) != FULL_HD_PX {
         notes
