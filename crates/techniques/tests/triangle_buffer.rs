@@ -1,9 +1,8 @@
 //! Attributes from triangle records: a million random triangles against f64, those that reach behind the eye included.
 
-use std::{
-    path::{Path, PathBuf},
-    sync::Arc,
-};
+mod common;
+
+use std::{path::Path, sync::Arc};
 
 use afterlight_oracle::packing::unpack_normal;
 use afterlight_techniques::{
@@ -12,9 +11,9 @@ use afterlight_techniques::{
     find,
     graph::{Graph, ImageHandle, gpu, gpu::vk},
     scene::{Aabb, Camera, Instance, Material, Mesh, Scene, VertexAttributes, rng::SplitMix64},
-    shader::{Shader, compile::Compiler, manifest},
     triangle_buffer,
 };
+use common::{compiled, sources};
 use glam::{Affine3A, DMat4, DVec2, DVec3, DVec4, Vec3};
 
 /// Triangles of a draw; every draw is full, so that bits, IDs and places are one.
@@ -42,14 +41,12 @@ enum Class {
     Far,
     /// Seen at 6 degrees to a hundredth of a degree.
     Grazing,
+    /// Thinner than what a rasteriser can tell: shows by chance. Not compared.
+    EdgeOn,
 }
 
 const CLASSES: [Class; 6] =
     [Class::Front, Class::OneBehind, Class::TwoBehind, Class::Sliver, Class::Far, Class::Grazing];
-
-fn class_of(triangle: usize) -> Class {
-    CLASSES[triangle % CLASSES.len()]
-}
 
 /// A random number in [0, 1).
 fn unit(rng: &mut SplitMix64) -> f64 {
@@ -116,7 +113,9 @@ fn corners(rng: &mut SplitMix64, class: Class, ray: DVec3, half: DVec2) -> [DVec
     };
     let pixel_m = distance_m * 2.0 * half.y / f64::from(SIZE_PX.1);
     let size_m = match class {
-        Class::Front | Class::Sliver | Class::Grazing => log_between(rng, pixel_m, 2.0 * distance_m),
+        Class::Front | Class::Sliver | Class::Grazing | Class::EdgeOn => {
+            log_between(rng, pixel_m, 2.0 * distance_m)
+        }
         Class::Far => log_between(rng, pixel_m, 64.0 * pixel_m),
         Class::OneBehind | Class::TwoBehind => log_between(rng, 1.5 * distance_m, 30.0 * distance_m),
     };
@@ -125,9 +124,12 @@ fn corners(rng: &mut SplitMix64, class: Class, ray: DVec3, half: DVec2) -> [DVec
     if class == Class::Sliver {
         second = (first + second * log_between(rng, 1e-4, 1e-1)) * (0.3 + unit(rng));
     }
+    // An edge along the ray, but for the angle.
     if class == Class::Grazing {
-        // An edge along the ray, but for the angle.
         second = ray.normalize() + second * log_between(rng, 2e-4, 1e-1);
+    }
+    if class == Class::EdgeOn {
+        second = ray.normalize() + second * log_between(rng, 1e-12, 1e-6);
     }
     let (first, second) = (first * size_m, second * size_m);
     let (mut b, mut c) = (unit(rng), unit(rng));
@@ -155,10 +157,11 @@ fn triangle(rng: &mut SplitMix64, class: Class, view: &View) -> Triangle {
         Class::TwoBehind => 2,
         _ => 0,
     };
+    let has_height = behind == 0 && class != Class::EdgeOn;
     let corners = loop {
         let corners = corners(rng, class, ray, view.half);
         let found = corners.iter().filter(|p| p.z > 0.0).count();
-        if found == behind && (behind > 0 || height_px(&corners, view.half) >= SNAP_PX) {
+        if found == behind && (!has_height || height_px(&corners, view.half) >= SNAP_PX) {
             break corners;
         }
     };
@@ -173,9 +176,10 @@ fn triangle(rng: &mut SplitMix64, class: Class, view: &View) -> Triangle {
     }
 }
 
-fn triangles(view: &View, draws: usize) -> Vec<Triangle> {
+/// Triangles of all classes in turn.
+fn triangles(view: &View, draws: usize, classes: &[Class]) -> Vec<Triangle> {
     let mut rng = SplitMix64::new(7);
-    (0..draws * DRAW_TRIANGLES).map(|i| triangle(&mut rng, class_of(i), view)).collect()
+    (0..draws * DRAW_TRIANGLES).map(|i| triangle(&mut rng, classes[i % classes.len()], view)).collect()
 }
 
 fn scene_of(triangles: &[Triangle], view: &View) -> Scene {
@@ -213,32 +217,6 @@ fn scene_of(triangles: &[Triangle], view: &View) -> Scene {
         cameras: vec![view.camera.clone()],
         ..Scene::default()
     }
-}
-
-/// Compiles a shader of this crate or of its tests, with parts of its text replaced.
-fn compiled(name: &str, path: &Path, replaced: &[(&str, &str)]) -> Shader {
-    let mut text = std::fs::read_to_string(path).expect("a shader");
-    for (from, to) in replaced {
-        assert!(text.contains(from), "{name} has changed: found no {from:?}");
-        text = text.replace(from, to);
-    }
-    let file = path.file_name().expect("a file").to_str().expect("a name");
-    let written = std::env::temp_dir().join(format!("afterlight-{}-{file}", std::process::id()));
-    std::fs::write(&written, text).expect("a file in the temporary folder");
-    let variant = manifest::Variant {
-        name: name.to_owned(),
-        stage: manifest::stage_of(file).expect("a stage"),
-        path: written.clone(),
-        folder: sources(),
-        defines: Vec::new(),
-    };
-    let found = Compiler::new().include_dir(sources()).compile(&variant).unwrap_or_else(|e| panic!("{e}"));
-    std::fs::remove_file(&written).expect("the file");
-    found.shader
-}
-
-fn sources() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
 }
 
 /// Records of all triangles, and what they give at a pixel each.
@@ -281,8 +259,8 @@ struct Stage<'a> {
 }
 
 impl<'a> Stage<'a> {
-    fn new(device: &'a gpu::Device, view: &'a View, draws: usize) -> Self {
-        let triangles = triangles(view, draws);
+    fn new(device: &'a gpu::Device, view: &'a View, draws: usize, classes: &[Class]) -> Self {
+        let triangles = triangles(view, draws, classes);
         let scene = scene_of(&triangles, view);
         let uploaded = SceneGpu::upload(device, &scene, &|_, _| {}).unwrap_or_else(|e| panic!("{e}"));
         let settings = Settings::for_scene(&scene, SIZE_PX.0, SIZE_PX.1);
@@ -301,8 +279,8 @@ impl<'a> Stage<'a> {
             .unwrap_or_else(|e| panic!("{e}"));
         let name = "triangle_buffer/derivatives.comp";
         renderer.add_shaders([
-            compiled("test/attributes.comp", &tests.join("attributes.comp.glsl"), &[]),
-            compiled(name, &sources().join(format!("{name}.glsl")), mutant),
+            compiled("test/attributes.comp", &tests.join("attributes.comp.glsl"), &[], &[]),
+            compiled(name, &sources().join(format!("{name}.glsl")), &[], mutant),
         ]);
         let technique =
             Records { pixels: self.triangles.iter().map(|t| t.pixel[0] | t.pixel[1] << 16).collect() };
@@ -561,7 +539,7 @@ const MAX_SHARES: (f64, f64) = (3.0, 0.2);
 fn attributes_of_a_million_triangles_agree_with_f64() {
     let gpu = afterlight_testkit::gpu();
     let view = View::new();
-    let stage = Stage::new(&gpu, &view, DRAWS);
+    let stage = Stage::new(&gpu, &view, DRAWS, &CLASSES);
     let found = stage.errors(&[]);
     print("as it is", &found);
     for (class, errors) in CLASSES.iter().zip(&found) {
@@ -578,7 +556,7 @@ fn attributes_of_a_million_triangles_agree_with_f64() {
 fn other_records_are_caught() {
     let gpu = afterlight_testkit::gpu();
     let view = View::new();
-    let stage = Stage::new(&gpu, &view, 64);
+    let stage = Stage::new(&gpu, &view, 64, &CLASSES);
     let caught = |what: &str, mutant: &[(&str, &str)], classes: &[Class]| {
         let found = stage.errors(mutant);
         print(what, &found);
@@ -591,4 +569,15 @@ fn other_records_are_caught() {
     caught("anchor at the centre", &[ANCHOR_AT_CENTER], &in_front);
     caught("the paper's", &[ANCHOR_AT_CENTER, BY_PROJECTED_VERTICES], &in_front);
     caught("projected vertices", &[BY_PROJECTED_VERTICES], &[]);
+}
+
+/// Triangles that show by chance alone give numbers; without the mean of their vertices some give none.
+#[test]
+fn triangles_edge_on_give_numbers() {
+    let gpu = afterlight_testkit::gpu();
+    let view = View::new();
+    let stage = Stage::new(&gpu, &view, 8, &[Class::EdgeOn]);
+    let not_finite = |mutant| stage.on_device(mutant).iter().filter(|f| !f.is_finite()).count();
+    assert_eq!(not_finite(&[]), 0);
+    assert!(not_finite(&[("!(abs(det) > ROUNDING * dot(lost, abs(w)))", "false")]) > 0, "infinite records go unseen");
 }

@@ -60,6 +60,20 @@ Affine affine(Basis b, vec3 a) {
     return Affine(dot(b.at, a), dot(b.dx, a), dot(b.dy, a));
 }
 
+const float ROUNDING = 1.2e-7;  // spacing of floats at 1
+
+// Magnitudes of the terms of cross2.
+float sum2(vec2 a, vec2 b) {
+    return abs(a.x * b.y) + abs(a.y * b.x);
+}
+
+// A triangle that is edge-on in floats shows where vertices are snapped to the raster's grid: the mean of its vertices.
+Basis flat_basis(vec3 w) {
+    vec3 in_front = vec3(greaterThan(w, vec3(0.0)));
+    float count = max(dot(in_front, vec3(1.0)), 1.0);
+    return Basis(in_front / (max(w, vec3(1e-30)) * count), vec3(0.0), vec3(0.0));
+}
+
 void store(uint word, Affine f) {
     triangle_buffer[word] = floatBitsToUint(f.at);
     triangle_buffer[word + 1u] = floatBitsToUint(f.dx);
@@ -152,7 +166,14 @@ Basis basis_at(vec2 anchor, vec3 c0, vec3 c1, vec3 c2, out float inverse_det) {
     vec3 b = vec3(cross2(q1, q2), cross2(q2, q0), cross2(q0, q1));
     vec3 bx = vec3(w.z * q1.y - w.y * q2.y, w.x * q2.y - w.z * q0.y, w.y * q0.y - w.x * q1.y);
     vec3 by = vec3(w.y * q2.x - w.z * q1.x, w.z * q0.x - w.x * q2.x, w.x * q1.x - w.y * q0.x);
-    inverse_det = 1.0 / dot(b, w);
+    float det = dot(b, w);
+    inverse_det = 1.0 / det;
+    // What rounding of clip positions and products may leave of a triangle that has no area.
+    vec2 m0 = abs(c0.xy) + abs(w.x), m1 = abs(c1.xy) + abs(w.y), m2 = abs(c2.xy) + abs(w.z);
+    vec3 lost = vec3(sum2(q1, m2) + sum2(m1, q2), sum2(q2, m0) + sum2(m2, q0), sum2(q0, m1) + sum2(m0, q1));
+    if (!(abs(det) > ROUNDING * dot(lost, abs(w)))) {
+        return flat_basis(w);
+    }
     return Basis(b * inverse_det, bx * (inverse_det * pixel_ndc.x), by * (inverse_det * pixel_ndc.y));
 }
 

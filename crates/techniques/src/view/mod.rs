@@ -4,7 +4,7 @@
 
 mod records;
 
-pub use records::{ATTRIBUTE_ERRORS, RecordSource};
+pub use records::{ATTRIBUTE_ERRORS, RECORD_SAMPLES, RecordSource};
 
 use afterlight_graph::{Graph, ImageHandle, RasterPass, gpu::vk};
 

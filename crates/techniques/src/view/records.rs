@@ -10,6 +10,10 @@ use crate::{error::TechniqueError, frame::Frame, geometry::Surfaces, scene::Aabb
 /// linear base colour. −1 where nothing is compared.
 pub const ATTRIBUTE_ERRORS: &str = "attribute errors";
 
+/// Name, after the technique's, of the buffer of counts that [`super::TRIANGLE_SHARING`] keeps: a 32-bit word a record, the
+/// image's visibility samples that refer to it; zero beyond the last record.
+pub const RECORD_SAMPLES: &str = "record samples";
+
 /// What the reference holds where it shows no surface: `NO_TRIANGLE`, all ones.
 const NO_TRIANGLE_UINT: [u32; 4] = [u32::MAX; 4];
 
@@ -45,12 +49,14 @@ impl RecordSource<'_> {
     /// A shader that is not compiled in.
     fn sharing(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let bytes = 4 * u64::from(self.records.capacity.max(1));
-        let counts = graph.buffer(&self.name("record samples"), bytes);
+        let counts = graph.buffer(&self.name(RECORD_SAMPLES), bytes);
         let counts = graph.clear_buffer(&self.name("clear record samples"), counts, 0);
         let mut pass = self.pass(graph, frame, "sharing count", "sharing_count")?;
         let counts = pass.write("RecordSamples", counts);
         pass.dispatch(frame.groups(8));
         pass.finish();
+
+        graph.keep(&counts);
 
         let target = self.target(graph, frame);
         let mut pass = self.pass(graph, frame, "sharing", "sharing")?;

@@ -1,13 +1,17 @@
 //! What the tests of whole techniques share: a scene on the validated device, images, comparisons.
 #![allow(dead_code)] // each test file uses a part
 
-use std::sync::Arc;
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use afterlight_image::{Rgba8Image, psnr_db};
 use afterlight_techniques::{
     Params, Prepared, Renderer, SceneGpu, Settings, Technique, TechniqueError,
     graph::gpu,
     scene::{self, Camera, Light, Scene, lights::seeded_lights},
+    shader::{Shader, compile::Compiler, manifest},
 };
 
 /// A scene on the device.
@@ -102,4 +106,33 @@ pub fn covered(image: &Rgba8Image) -> f64 {
 /// Lights whose range is larger by a factor: a mutant that comparisons must catch.
 pub fn wider(lights: &[Light], factor: f32) -> Vec<Light> {
     lights.iter().map(|l| Light { range_m: l.range_m * factor, ..*l }).collect()
+}
+
+/// Folder of this crate's shaders.
+pub fn sources() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
+}
+
+/// Compiles a shader of this crate or of its tests under a name, with parts of its text replaced.
+pub fn compiled(name: &str, path: &Path, defines: &[&str], replaced: &[(&str, &str)]) -> Shader {
+    let mut text = std::fs::read_to_string(path).expect("a shader");
+    for (from, to) in replaced {
+        assert!(text.contains(from), "{name} has changed: found no {from:?}");
+        text = text.replace(from, to);
+    }
+    let file = path.file_name().expect("a file").to_str().expect("a name");
+    // Tests of one process compile at the same time.
+    let thread = format!("{:?}", std::thread::current().id()).replace(['(', ')'], "");
+    let written = std::env::temp_dir().join(format!("afterlight-{}-{thread}-{file}", std::process::id()));
+    std::fs::write(&written, text).expect("a file in the temporary folder");
+    let variant = manifest::Variant {
+        name: name.to_owned(),
+        stage: manifest::stage_of(file).expect("a stage"),
+        path: written.clone(),
+        folder: sources(),
+        defines: defines.iter().map(|d| ((*d).to_owned(), None)).collect(),
+    };
+    let found = Compiler::new().include_dir(sources()).compile(&variant).unwrap_or_else(|e| panic!("{e}"));
+    std::fs::remove_file(&written).expect("the file");
+    found.shader
 }
