@@ -766,6 +766,8 @@ pub(crate) struct RasterNode {
     pub commands: Vec<RasterCommand>,
     /// Extent of a pass without attachments.
     pub extent: Option<(u32, u32)>,
+    /// Viewport in pixels: x, y, width, height; `None` is the attachments' extent.
+    pub viewport: Option<[f32; 4]>,
 }
 
 #[derive(Clone, Copy)]
@@ -1174,7 +1176,8 @@ impl Graph {
     }
 }
 
-/// A raster pass under declaration. Viewport and default scissor are the attachments' extent.
+/// A raster pass under declaration. Viewport and default scissor are the attachments' extent, unless
+/// [`RasterPass::viewport`] sets another viewport.
 pub struct RasterPass<'g> {
     graph: &'g mut Graph,
     pass: usize,
@@ -1305,6 +1308,12 @@ impl RasterPass<'_> {
     /// Sets the extent in pixels of a pass without attachments.
     pub fn extent(&mut self, width_px: u32, height_px: u32) -> &mut Self {
         self.node().extent = Some((width_px, height_px));
+        self
+    }
+
+    /// Sets the viewport, pixels: x, y, width, height. It may reach beyond the attachments, which then hold a part of the view.
+    pub fn viewport(&mut self, rect_px: [f32; 4]) -> &mut Self {
+        self.node().viewport = Some(rect_px);
         self
     }
 

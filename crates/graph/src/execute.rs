@@ -191,6 +191,7 @@ enum BoundDispatch {
 enum Body {
     Raster {
         extent: [u32; 2],
+        viewport: Option<[f32; 4]>,
         layers: u32,
         colors: Vec<ColorTarget>,
         depth: Option<DepthTarget>,
@@ -1086,6 +1087,7 @@ impl Builder<'_> {
             .collect();
         Ok(Body::Raster {
             extent,
+            viewport: node.viewport,
             layers,
             colors: node.colors.iter().map(|color| self.color_target(color)).collect::<Result<_, _>>()?,
             depth: node.depth.as_ref().map(|depth| self.depth_target(pass, depth)).transpose()?,
@@ -1275,8 +1277,11 @@ impl Bindings {
 impl Body {
     fn record(&self, encoder: &mut gpu::Encoder) -> Result<(), GpuError> {
         match self {
-            Body::Raster { extent, layers, colors, depth, pipelines, commands } => {
+            Body::Raster { extent, viewport, layers, colors, depth, pipelines, commands } => {
                 begin(encoder, *extent, *layers, colors, depth.as_ref());
+                if let Some(rect_px) = viewport {
+                    encoder.set_viewport(*rect_px, [0.0, 1.0]);
+                }
                 let mut bound = usize::MAX;
                 for command in commands {
                     match command {

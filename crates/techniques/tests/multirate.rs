@@ -28,11 +28,7 @@ fn ways(samples: u32) -> Vec<Way> {
     let way = |sets, full, bound| Way { id: "dais-multirate", sets, full: ("dais", full), bound };
     let mut ways = vec![
         way(&[("visibility", "raster"), ("share", "grid")], RASTER, HALF_RATE_BOUND),
-        way(
-            &[("visibility", "compute"), ("share", "grid"), ("lights", "tiled")],
-            COMPUTE,
-            HALF_RATE_BOUND,
-        ),
+        way(&[("visibility", "compute"), ("share", "grid"), ("lights", "tiled")], COMPUTE, HALF_RATE_BOUND),
         way(&[("fill", "cache"), ("share", "grid")], CACHE, HALF_RATE_BOUND),
         way(&[("visibility", "raster"), ("share", "quads")], RASTER, HALF_RATE_BOUND),
         way(&[("visibility", "compute"), ("share", "quads")], COMPUTE, HALF_RATE_BOUND),

@@ -25,7 +25,7 @@ fn ways(id: &str) -> &'static [&'static [(&'static str, &'static str)]] {
             &[("fill", "cache"), ("cache-buckets", "1")],
             &[("fill", "cache"), ("reference-bits", "8")],
         ],
-        "dais-list" => &[&[], &[("cache-buckets", "1")]],
+        "dais-list" => &[&[], &[("bands", "1")], &[("bands", "3")]],
         _ => &[&[]],
     }
 }
@@ -225,6 +225,64 @@ fn a_bound_on_blocks_is_told() {
             }
             assert!(last_db > 50.0, "{samples} samples, {fill}: {last_db:.2} dB with room for all");
         }
+    }
+}
+
+/// The triangle buffer and the lists begin with room for 16: where a view needs a hundred times as much and more, it gets it, and the
+/// image is right.
+#[test]
+fn lists_a_hundred_times_too_small_get_room() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=100000&texture=64");
+    for samples in counts(&gpu) {
+        let settings = Settings { samples, ..stage.settings((320, 180), 20) };
+        let dedup = stage.image(find("deferred-dedup").unwrap(), &settings);
+        for (id, way) in
+            [("dais", &[("fill", "resolve")][..]), ("dais", &[("fill", "cache")]), ("dais-list", &[])]
+        {
+            let technique = find(id).unwrap();
+            let mut prepared = stage.prepare_with(technique, &settings, &params(technique, way));
+            let db = psnr(&dedup, &image_of(&mut prepared));
+            let counters = prepared.counters().unwrap_or_else(|e| panic!("{e}"));
+            println!("{samples} samples: {id} {way:?}: {db:.2} dB, {counters:?}");
+            assert!(db >= 45.0, "{samples} samples: {id} {way:?}: {db:.2} dB to deferred-dedup");
+            for counter in &counters {
+                assert!(counter.dropped == 0 && counter.needed > 1600, "{id} {way:?}: {counter:?}");
+            }
+        }
+    }
+}
+
+/// A bound on nodes that is too small drops samples, says how many, and what remains takes their weight: the background does not
+/// show through.
+#[test]
+fn a_bound_on_nodes_is_told() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=30000");
+    let list = find("dais-list").unwrap();
+    for samples in counts(&gpu) {
+        let settings = Settings { samples, ..stage.settings((320, 180), 100) };
+        let all = image_of(&mut stage.prepare(list, &settings));
+        let mut last_db = 0.0;
+        for nodes in ["0", "1000", "100000"] {
+            let mut prepared = stage.prepare_with(list, &settings, &params(list, &[("nodes", nodes)]));
+            let db = psnr(&all, &image_of(&mut prepared)).min(99.0);
+            let counters = prepared.counters().unwrap_or_else(|e| panic!("{e}"));
+            let counter = counters.iter().find(|c| c.name == "nodes").expect("nodes are counted");
+            println!("{samples} samples: {nodes} nodes: {db:.2} dB to all, {counter:?}");
+            assert_eq!(counter.dropped > 0, counter.needed > counter.capacity, "{counter:?}");
+            assert!(db > last_db, "{samples} samples: {nodes} nodes: {db:.2} dB, {last_db:.2} with fewer");
+            last_db = db;
+        }
+        assert!(last_db > 50.0, "{samples} samples: {last_db:.2} dB with room for all");
+        // A white background makes what shows through bright.
+        let mut white = settings.clone();
+        white.environment.background_radiance = Vec3::splat(100.0);
+        let bright = |nodes: &str| {
+            let image = image_of(&mut stage.prepare_with(list, &white, &params(list, &[("nodes", nodes)])));
+            image.pixels.chunks_exact(4).filter(|p| p[..3] == [255; 3]).count()
+        };
+        assert!(bright("0") <= bright("auto"), "the background shows through dropped samples");
     }
 }
 

@@ -579,5 +579,8 @@ fn triangles_edge_on_give_numbers() {
     let stage = Stage::new(&gpu, &view, 8, &[Class::EdgeOn]);
     let not_finite = |mutant| stage.on_device(mutant).iter().filter(|f| !f.is_finite()).count();
     assert_eq!(not_finite(&[]), 0);
-    assert!(not_finite(&[("!(abs(det) > ROUNDING * dot(lost, abs(w)))", "false")]) > 0, "infinite records go unseen");
+    assert!(
+        not_finite(&[("!(abs(det) > ROUNDING * dot(lost, abs(w)))", "false")]) > 0,
+        "infinite records go unseen"
+    );
 }

@@ -32,7 +32,7 @@ pub(crate) const FILL: ParamInfo = ParamInfo {
     default: "auto",
 };
 /// How many triangles samples tell apart that hold coverage as well.
-const REFERENCE_BITS: ParamInfo = ParamInfo {
+pub(crate) const REFERENCE_BITS: ParamInfo = ParamInfo {
     key: "reference-bits",
     summary: "fill=cache: bits of the reference in a visibility sample that holds coverage as well; where triangles need more, samples hold 32 bits of reference and no coverage",
     kind: ParamKind::Integer { min: 8, max: 24 },
@@ -82,9 +82,9 @@ impl Cache {
     }
 
     /// Binds it to the pass whose fragments store triangles.
-    pub fn bind(self, pass: &mut RasterPass<'_>) {
-        let _entries = pass.write("CacheEntries", self.entries);
-        let _locks = pass.write("CacheLocks", self.locks);
+    pub fn written_by(self, pass: &mut RasterPass<'_>) -> Self {
+        let entries = pass.write("CacheEntries", self.entries);
+        Self { entries, locks: pass.write("CacheLocks", self.locks), ..self }
     }
 }
 
@@ -258,7 +258,7 @@ fn record_cached(
     frame.bind_scene(&mut pass);
     let references = pass.color(references, Load::Clear(NO_TRIANGLE_RGBA8));
     pass.depth_read_only(&depth);
-    cache.bind(&mut pass);
+    let _cache = cache.written_by(&mut pass);
     let list = list.written_by(&mut pass);
     passes.draw_fill(frame, &mut pass);
     pass.finish();

@@ -15,6 +15,15 @@ pub(crate) struct ScenePasses {
 }
 
 impl ScenePasses {
+    /// Depth alone, as the first pass draws it.
+    ///
+    /// # Errors
+    /// A shader that is not compiled in.
+    pub fn depth_only(frame: &Frame<'_>) -> Result<Surfaces, TechniqueError> {
+        let depth = Surfaces::depth_only(frame)?;
+        if frame.tessellate_px.is_some() { depth.through_geometry(frame) } else { Ok(depth) }
+    }
+
     /// `fragment` names the second pass's shader, `tags` its variant besides `mask` and `whole`.
     ///
     /// # Errors
@@ -30,7 +39,7 @@ impl ScenePasses {
         let tags = [if whole { &["whole"][..] } else { &[] }, tags].concat();
         let opaque = variant(fragment, &tags);
         let masked = variant(fragment, &[&["mask"], &tags[..]].concat());
-        let depth = Surfaces::depth_only(frame)?;
+        let depth = Self::depth_only(frame)?;
         if !whole {
             let fill = Surfaces::new(
                 frame,
@@ -42,11 +51,7 @@ impl ScenePasses {
         let fill = Surfaces::shaded(frame, &opaque, &masked)?.whole_triangles(frame, info.id)?;
         let numbers = graph.buffer(&format!("{}/triangle numbers", info.id), 4);
         let numbers = graph.clear_buffer(&format!("{}/clear triangle numbers", info.id), numbers, 0);
-        Ok(Self {
-            depth: depth.through_geometry(frame)?,
-            fill: fill.depth(DepthTest::EQUAL),
-            numbers: Some(numbers),
-        })
+        Ok(Self { depth, fill: fill.depth(DepthTest::EQUAL), numbers: Some(numbers) })
     }
 
     /// Binds what the second pass counts triangles with and adds its draws.

@@ -2,7 +2,7 @@
 
 // ORDER: 150
 
-use afterlight_graph::{Graph, ImageHandle, Load};
+use afterlight_graph::{BufferHandle, ComputePass, Graph, ImageHandle, ImageInfo, Load, RasterPass};
 
 use crate::{
     Answers, AppendixA, Exactness, Frame, Info, MULTIPLE_SAMPLES, Need, ParamInfo, ParamKind, Params, Source,
@@ -12,7 +12,9 @@ use crate::{
     dais_multirate::{FULL_RATE, LowRate, SHARE},
     depth_prepass::FIRST_FRAGMENT,
     gbuffer_list::{self, NOT_TAKEN},
-    multisample, triangle_buffer, view,
+    multisample,
+    scene_gpu::DRAW_TRIANGLES,
+    triangle_buffer, view,
 };
 
 /// The technique.
@@ -28,10 +30,22 @@ const NODES: ParamInfo = ParamInfo {
     default: "auto",
 };
 
-/// Most triangles that a node's 28 bits tell apart.
-const REFERENCES_MAX: u32 = 1 << 28;
-/// Pixels for each node that the first frame of a view has room for: it is run to count what the view needs.
-const FIRST_GUESS_PIXELS: u64 = 64;
+const BANDS: ParamInfo = ParamInfo {
+    key: "bands",
+    summary: "horizontal bands of the image that are drawn one after another, so that depth at the samples is held for one of them",
+    kind: ParamKind::Integer { min: 1, max: 16 },
+    default: "2",
+};
+
+/// Most triangles that the reference of an entry tells apart.
+const fn references_max(samples: u32) -> u32 {
+    1 << if samples > 8 { 27 } else { 28 }
+}
+
+/// Rows that bands are multiples of: whole quads, and tiles of the raster part.
+const BAND_ROWS: u32 = 16;
+/// Nodes that the first frame of a view has room for: it is run to count what the view needs.
+const FIRST_GUESS: u32 = 16;
 
 static INFO: Info = Info {
     id: "dais-list",
@@ -54,7 +68,7 @@ static INFO: Info = Info {
         rates_decoupled: "y, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 45.0 },
-    params: &[multisample::LIGHTS, NODES, dais::CACHE_BUCKETS, FULL_RATE, SHARE],
+    params: &[multisample::LIGHTS, NODES, BANDS, dais::CACHE_BUCKETS, FULL_RATE, SHARE],
     needs: &[Need { name: "post-depth coverage", test: |features| features.post_depth_coverage }],
     samples: MULTIPLE_SAMPLES,
     tessellation: true,
@@ -71,58 +85,245 @@ impl Technique for DaisList {
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
+        let mut lists = Lists::new(graph, frame)?;
+        let mut triangles = Triangles::new(graph, frame)?;
+        let mut depth: Option<ImageHandle> = None;
+        let bands = Band::of(frame);
+        for band in &bands {
+            let image = depth.take().unwrap_or_else(|| band.depth(graph, frame));
+            let image = band.draw_depth(graph, frame, image)?;
+            (depth, lists, triangles) = band.fill(graph, frame, image, lists, triangles)?;
+        }
+        frame.watch(graph, "nodes", &lists.node_count, lists.capacity, lists.bounded);
+        let rate = LowRate::chosen(frame, &INFO)?;
+        let source = if frame.tessellate_px.is_some() { "dais-nodes-places" } else { "dais-nodes" };
+        let stored = triangles.store(graph, frame)?;
+        dais::shade(graph, frame, &INFO, rate.as_ref(), source, stored.records(), |pass| {
+            lists.bind(pass);
+            stored.bind(pass);
+        })
+    }
+}
+
+/// Heads and nodes of a frame.
+struct Lists {
+    heads: BufferHandle,
+    nodes: BufferHandle,
+    node_count: BufferHandle,
+    drops: BufferHandle,
+    claims: Option<BufferHandle>,
+    capacity: u32,
+    bounded: bool,
+}
+
+impl Lists {
+    /// Declares empty lists.
+    fn new(graph: &mut Graph, frame: &Frame<'_>) -> Result<Self, TechniqueError> {
         let pixels = u64::from(frame.width_px) * u64::from(frame.height_px);
         let fixed: Option<u32> = frame.params.text(&INFO, NODES.key).parse().ok();
-        let first_guess = u32::try_from(pixels / FIRST_GUESS_PIXELS).unwrap_or(u32::MAX);
-        let capacity = fixed.unwrap_or_else(|| frame.capacity("nodes", first_guess));
+        let capacity = fixed.unwrap_or_else(|| frame.capacity("nodes", FIRST_GUESS));
         let limit = frame.features().max_storage_buffer_range;
         if 8 * u64::from(capacity) > limit {
             let what = "dais-list: bytes of nodes".to_owned();
             return Err(TechniqueError::TooLarge { what, found: 8 * u64::from(capacity), limit });
         }
-        let depth =
-            graph.image("dais-list/depth", frame.multisampled_info(frame.small_depth_stencil_format()));
-        let heads = graph.buffer("dais-list/heads", 4 * pixels);
-        let nodes = graph.buffer("dais-list/nodes", 8 * u64::from(capacity.max(1)));
-        let node_count = graph.buffer("dais-list/node count", 8);
-        let heads = graph.clear_buffer("dais-list/clear heads", heads, 0);
-        let node_count = graph.clear_buffer("dais-list/clear node count", node_count, 0);
-        let claims = gbuffer_list::claims(graph, frame, INFO.id, frame.samples);
-        let cache = Cache::new(graph, frame, &INFO);
-        let list = triangle_buffer::List::new(graph, frame, INFO.id, REFERENCES_MAX)?;
+        let zeroed = |graph: &mut Graph, name: &str, bytes: u64| {
+            let buffer = graph.buffer(&format!("dais-list/{name}"), bytes);
+            graph.clear_buffer(&format!("dais-list/clear {name}"), buffer, 0)
+        };
+        Ok(Self {
+            heads: zeroed(graph, "heads", 4 * pixels),
+            nodes: graph.buffer("dais-list/nodes", 8 * u64::from(capacity.max(1))),
+            node_count: zeroed(graph, "node count", 8),
+            // Nobody asks what was dropped where nothing can be.
+            drops: zeroed(
+                graph,
+                "sample drops",
+                if fixed.is_some() { pixels.next_multiple_of(4) } else { 4 },
+            ),
+            claims: gbuffer_list::claims(graph, frame, INFO.id, frame.samples),
+            capacity,
+            bounded: fixed.is_some(),
+        })
+    }
+
+    fn written_by(self, pass: &mut RasterPass<'_>) -> Self {
+        Self {
+            heads: pass.write("Heads", self.heads),
+            nodes: pass.write("Nodes", self.nodes),
+            node_count: pass.write("NodeCount", self.node_count),
+            drops: pass.write("SampleDrops", self.drops),
+            claims: self.claims.map(|claims| pass.write("SampleClaims", claims)),
+            ..self
+        }
+    }
+
+    /// Binds what `source_dais_list.glsl` reads.
+    fn bind(&self, pass: &mut ComputePass<'_>) {
+        pass.read("Heads", &self.heads).read("Nodes", &self.nodes).read("SampleDrops", &self.drops);
+        pass.constant("BOUNDED", u32::from(self.bounded));
+    }
+}
+
+/// How triangles that show get into the triangle buffer.
+enum Triangles {
+    /// Bits that fragments set.
+    Marked(BufferHandle),
+    /// A list that fragments append to through the cache: tessellated triangles, whose IDs lead nowhere.
+    Listed { cache: Cache, list: triangle_buffer::List },
+}
+
+/// Triangles that are stored.
+enum Stored {
+    Marked(triangle_buffer::TriangleBuffer),
+    Listed(triangle_buffer::Records),
+}
+
+impl Triangles {
+    fn new(graph: &mut Graph, frame: &Frame<'_>) -> Result<Self, TechniqueError> {
+        let most = references_max(frame.samples);
+        if frame.tessellate_px.is_some() {
+            let cache = Cache::new(graph, frame, &INFO);
+            return Ok(Self::Listed {
+                cache,
+                list: triangle_buffer::List::new(graph, frame, INFO.id, most)?,
+            });
+        }
+        let triangles = u64::from(DRAW_TRIANGLES) * frame.scene.draw_count() as u64;
+        if triangles > u64::from(most) {
+            let what = "dais-list: triangles that a reference tells apart".to_owned();
+            return Err(TechniqueError::TooLarge { what, found: triangles, limit: most.into() });
+        }
+        Ok(Self::Marked(triangle_buffer::bits(graph, frame, INFO.id, 0)))
+    }
+
+    /// Specialization constants of the fragments that write it.
+    fn constants(&self) -> Vec<(String, u32)> {
+        match self {
+            Self::Marked(_) => Vec::new(),
+            Self::Listed { cache, list } => cache.constants(list),
+        }
+    }
+
+    fn written_by(self, pass: &mut RasterPass<'_>) -> Self {
+        match self {
+            Self::Marked(bits) => Self::Marked(pass.write("MarkedBits", bits)),
+            Self::Listed { cache, list } => {
+                Self::Listed { cache: cache.written_by(pass), list: list.written_by(pass) }
+            }
+        }
+    }
+
+    fn store(self, graph: &mut Graph, frame: &Frame<'_>) -> Result<Stored, TechniqueError> {
+        Ok(match self {
+            Self::Marked(bits) => {
+                Stored::Marked(triangle_buffer::store_marked(graph, frame, INFO.id, bits, false)?)
+            }
+            Self::Listed { list, .. } => Stored::Listed(list.derivatives(graph, frame, INFO.id)?),
+        })
+    }
+}
+
+impl Stored {
+    fn records(&self) -> &triangle_buffer::Records {
+        match self {
+            Self::Marked(buffer) => &buffer.records,
+            Self::Listed(records) => records,
+        }
+    }
+
+    fn bind(&self, pass: &mut ComputePass<'_>) {
+        match self {
+            Self::Marked(buffer) => buffer.bind(pass),
+            Self::Listed(records) => records.bind(pass),
+        }
+    }
+}
+
+/// Rows of the image that are drawn at once.
+struct Band {
+    number: u32,
+    first_row: u32,
+    rows: u32,
+}
+
+impl Band {
+    /// The bands of a frame by [`BANDS`]. Tessellated triangles are numbered anew in each pass, which a cache cannot tell apart: one
+    /// band.
+    fn of(frame: &Frame<'_>) -> Vec<Self> {
+        let count = match frame.tessellate_px {
+            Some(_) => 1,
+            None => frame.params.number(&INFO, BANDS.key) as u32,
+        };
+        let rows = frame.height_px.div_ceil(count).next_multiple_of(BAND_ROWS).min(frame.height_px);
+        let first_rows = (0..frame.height_px).step_by(rows.max(1) as usize);
+        first_rows.zip(1..).map(|(first_row, number)| Self { number, first_row, rows }).collect()
+    }
+
+    /// Name of a pass over the band.
+    fn pass_name(&self, pass: &str) -> String {
+        match self.number {
+            1 => format!("dais-list/{pass}"),
+            number => format!("dais-list/{pass} {number}"),
+        }
+    }
+
+    /// Declares the depth buffer that all bands share.
+    fn depth(&self, graph: &mut Graph, frame: &Frame<'_>) -> ImageHandle {
+        let info = ImageInfo::new(frame.small_depth_stencil_format(), frame.width_px, self.rows);
+        graph.image("dais-list/depth", info.samples(frame.samples))
+    }
+
+    /// The whole image, of which attachments hold the band.
+    fn viewport(&self, frame: &Frame<'_>) -> [f32; 4] {
+        [0.0, -(self.first_row as f32), frame.width_px as f32, frame.height_px as f32]
+    }
+
+    fn draw_depth(
+        &self,
+        graph: &mut Graph,
+        frame: &Frame<'_>,
+        depth: ImageHandle,
+    ) -> Result<ImageHandle, TechniqueError> {
+        let surfaces = ScenePasses::depth_only(frame)?;
+        let mut pass = graph.raster(&self.pass_name("depth"));
+        frame.bind_scene(&mut pass);
+        let depth = pass.depth(depth, Load::Clear(0.0));
+        pass.stencil_clear(0).viewport(self.viewport(frame));
+        surfaces.draw(frame, &mut pass);
+        pass.finish();
+        Ok(depth)
+    }
+
+    fn fill(
+        &self,
+        graph: &mut Graph,
+        frame: &Frame<'_>,
+        depth: ImageHandle,
+        lists: Lists,
+        triangles: Triangles,
+    ) -> Result<(Option<ImageHandle>, Lists, Triangles), TechniqueError> {
         let mut passes = ScenePasses::new(graph, frame, &INFO, "dais_list/fill.frag", &[])?;
         let fill = &mut passes.fill;
         (fill.stencil, fill.stencil_reference) = (Some(FIRST_FRAGMENT), 1);
         fill.masked_stencil = Some(NOT_TAKEN);
-        fill.constants = cache.constants(&list);
-        fill.constants.push(("SAMPLES".to_owned(), frame.samples));
-        fill.constants.push(("NODE_CAPACITY".to_owned(), capacity));
+        fill.constants = triangles.constants();
+        let bounded = u32::from(lists.bounded);
+        for (name, value) in
+            [("SAMPLES", frame.samples), ("NODE_CAPACITY", lists.capacity), ("BOUNDED", bounded)]
+        {
+            fill.constants.push((name.to_owned(), value));
+        }
+        fill.push = self.first_row.to_le_bytes().to_vec();
 
-        let mut pass = graph.raster("dais-list/depth");
-        frame.bind_scene(&mut pass);
-        let depth = pass.depth(depth, Load::Clear(0.0));
-        pass.stencil_clear(0);
-        passes.depth.draw(frame, &mut pass);
-        pass.finish();
-
-        let mut pass = graph.raster("dais-list/fill");
+        let mut pass = graph.raster(&self.pass_name("fill"));
         frame.bind_scene(&mut pass);
         let depth = pass.stencil(depth, Load::Keep);
-        let heads = pass.write("Heads", heads);
-        let nodes = pass.write("Nodes", nodes);
-        let node_count = pass.write("NodeCount", node_count);
-        let _claims = claims.map(|claims| pass.write("SampleClaims", claims));
-        cache.bind(&mut pass);
-        let list = list.written_by(&mut pass);
+        pass.viewport(self.viewport(frame));
+        let lists = lists.written_by(&mut pass);
+        let triangles = triangles.written_by(&mut pass);
         passes.draw_fill(frame, &mut pass);
         pass.finish();
-
-        let triangles = list.derivatives(graph, frame, INFO.id)?;
-        frame.watch(graph, "nodes", &node_count, capacity, fixed.is_some());
-        let rate = LowRate::chosen(frame, &INFO)?;
-        dais::shade(graph, frame, &INFO, rate.as_ref(), "dais-nodes", &triangles, |pass| {
-            pass.read("gbuffer_depth", &depth).read("Heads", &heads).read("Nodes", &nodes);
-            triangles.bind(pass);
-        })
+        Ok((Some(depth), lists, triangles))
     }
 }

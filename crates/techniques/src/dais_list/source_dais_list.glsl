@@ -1,5 +1,11 @@
-// Surfaces of a pixel from its list of references into the triangle buffer (Schied and Dachsbacher 2015, section 4.3).
+// Surfaces of a pixel from its list of references to triangles (Schied and Dachsbacher 2015, section 4.3).
+//
+// PLACES: references are places in the triangle buffer, else triangle IDs.
+#include "dais_list/lists.glsl"
 #include "triangle_buffer/interpolate.glsl"
+#ifndef PLACES
+#include "triangle_buffer/index.glsl"
+#endif
 
 layout(set = 0, binding = 9, scalar) readonly buffer Heads {
     uint heads[];
@@ -7,44 +13,76 @@ layout(set = 0, binding = 9, scalar) readonly buffer Heads {
 layout(set = 0, binding = 10, scalar) readonly buffer Nodes {
     uvec2 nodes[];
 };
+// Samples of a pixel that found no node, 8 bits.
+layout(set = 0, binding = 26, scalar) readonly buffer SampleDrops {
+    uint sample_drops[];
+};
+layout(constant_id = 15) const uint BOUNDED = 0u;
 
 ivec2 source_pixel;
-uint source_link;           // head or next node plus one; 0 at the end
+uint source_link;           // the list's rest, as a head
 uint source_sum;
 uint source_background;     // samples without a surface
 
+uint pixel_number(ivec2 pixel) {
+    return uint(pixel.y) * frame.size_px.x + uint(pixel.x);
+}
+
 void source_begin(ivec2 pixel) {
     source_pixel = pixel;
-    source_link = heads[uint(pixel.y) * frame.size_px.x + uint(pixel.x)];
+    source_link = heads[pixel_number(pixel)];
     source_sum = 0u;
     source_background = 0u;
 }
 
-// The next triangle of the pixel, by its place in the triangle buffer, and its samples.
+// Samples that were dropped for want of nodes are not the background.
+uint dropped_samples(uint pixel) {
+    return BOUNDED != 0u ? sample_drops[pixel / 4u] >> pixel % 4u * 8u & 0xffu : 0u;
+}
+
+// The next triangle of the pixel, by its reference, and its samples.
 bool source_next_triangle(out uint name, out uint weight) {
     weight = 0u;
     name = NO_TRIANGLE;
     if (source_link == 0u) {
-        // Samples that were dropped for want of nodes are not the background: the depth buffer tells.
-        source_background = source_sum < SAMPLES ? samples_without_surface(source_pixel) : 0u;
+        source_background = SAMPLES - min(source_sum + dropped_samples(pixel_number(source_pixel)), SAMPLES);
         return false;
     }
-    name = source_link & 0x7fffffffu;
-    weight = SAMPLES;
-    if ((source_link & 0x80000000u) != 0u) {
-        source_link = 0u;
-    } else {
-        uvec2 node = nodes[source_link - 1u];
-        name = node.x & 0xfffffffu;
-        weight = (node.x >> 28) + 1u;
+    uint entry = source_link;
+    source_link = 0u;
+    if ((entry & ENTRY) == 0u) {
+        uvec2 node = nodes[entry - 1u];
+        entry = node.x;
         source_link = node.y;
     }
+    name = entry_reference(entry);
+    weight = entry_samples(entry);
     source_sum += weight;
     return true;
 }
 
+// A triangle's place in the triangle buffer.
 uint source_place(uint name) {
+#ifdef PLACES
     return name;
+#else
+    return triangle_index(name);
+#endif
+}
+
+// View distances of what is shaded in a pixel, at its centre; false where it shows no surface.
+bool distance_range(ivec2 pixel, out float nearest_m, out float farthest_m) {
+    nearest_m = 3.402823e38;
+    farthest_m = -1.0;
+    uint name, weight;
+    source_begin(pixel);
+    while (source_next_triangle(name, weight)) {
+        float distance_m = record_distance(source_place(name), vec2(pixel));
+        // Beside a triangle that is seen edge-on its plane may lie behind the eye: the tile has no far end then.
+        nearest_m = min(nearest_m, max(distance_m, 0.0));
+        farthest_m = max(farthest_m, distance_m > 0.0 ? distance_m : 3.402823e38);
+    }
+    return farthest_m >= 0.0;
 }
 
 #include "triangle_buffer/surface.glsl"

@@ -147,12 +147,13 @@ static INFO: Info = Info {
         SHARE,
         dais::FILL,
         dais::CACHE_BUCKETS,
+        dais::REFERENCE_BITS,
         compute_raster::VISIBILITY,
         compute_raster::SMALL,
     ],
     needs: &[],
     samples: &[1, 2, 4, 8],
-    tessellation: false,
+    tessellation: true,
     views: view::TRIANGLES,
 };
 

@@ -13,7 +13,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 
 layout(set = 0, binding = 14, rgba16f) writeonly uniform image2D hdr;
 
-#ifdef LIGHTS_TILED
+#if defined(LIGHTS_TILED) && !defined(SOURCE_DAIS_LIST)
 // View distances of a pixel's surfaces; false where it shows none.
 bool distance_range(ivec2 pixel, out float nearest_m, out float farthest_m) {
     nearest_m = 3.402823e38;

@@ -6,7 +6,7 @@
 #include "heat.glsl"
 #include "multisample/sample_depth.glsl"
 
-#ifndef SOURCE_DEDUP
+#if !defined(SOURCE_DEDUP) && !defined(SOURCE_DAIS_LIST)
 // View distance of a sample's surface, negative without one: bounds of what a tile's lights must reach.
 float source_distance(ivec2 pixel, uint i) {
     float depth = SAMPLE_DEPTH(pixel, i);

@@ -47,12 +47,28 @@ vec4 tangent_from_changes(vec3 normal_ws, vec3 dp_dx, vec3 dp_dy, TextureCoordin
     return vec4(tangent, dot(cross(n, tangent), along_v) < 0.0 ? 1.0 : -1.0);
 }
 
+// First word of a record. In a frame that has more triangles than room, which is recorded again, those without a place show the
+// last.
+uint record_at(uint index) {
+    return min(index, uint(triangle_buffer.length()) / RECORD_WORDS - 1u) * RECORD_WORDS;
+}
+
 // `pixel` is a place in pixels, whole at pixel centres.
-SurfacePoint interpolated_point(uint index, vec2 pixel, out uint material) {
-    // In a frame that has more triangles than room, which is recorded again, those without a place show the last.
-    uint record = min(index, uint(triangle_buffer.length()) / RECORD_WORDS - 1u) * RECORD_WORDS;
+vec2 record_offset(uint record, vec2 pixel) {
     uint packed_anchor = triangle_buffer[record + 19u];
-    vec2 from_anchor = pixel - vec2(packed_anchor & 0xffffu, packed_anchor >> 16);
+    return pixel - vec2(packed_anchor & 0xffffu, packed_anchor >> 16);
+}
+
+// View distance of a triangle's plane, m.
+float record_distance(uint index, vec2 pixel) {
+    uint record = record_at(index);
+    float first = record_affine(record, record_offset(record, pixel)).x;
+    return frame.eye_ws.w == 0.0 ? first : 1.0 / first;
+}
+
+SurfacePoint interpolated_point(uint index, vec2 pixel, out uint material) {
+    uint record = record_at(index);
+    vec2 from_anchor = record_offset(record, pixel);
     vec2 center = pixel + 0.5;
     vec3 first_words = record_affine(record, from_anchor);
     bool orthographic = frame.eye_ws.w == 0.0;

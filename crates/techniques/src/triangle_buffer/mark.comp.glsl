@@ -1,4 +1,4 @@
-// Marks the triangles that show in any sample: a thread a pixel. No lock and no cache, since a bit needs no slot.
+// Marks the triangles that show in any sample: a thread a pixel.
 //
 // In: ids, RGBA8 as 32 bits, or the keys of compute_raster. Out: MarkedBits, a bit a triangle of the scene. Dispatch: 8x8 groups.
 #version 460
@@ -7,12 +7,9 @@
 #include "scene.glsl"
 #define IDS_BINDING 8
 #include "multisample/triangles.glsl"
+#include "triangle_buffer/marks.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
-layout(set = 0, binding = 10, scalar) buffer MarkedBits {
-    uint marked_bits[];
-};
-
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(gl_GlobalInvocationID.xy, frame.size_px))) {
@@ -25,10 +22,6 @@ void main() {
             continue;
         }
         before = id;
-        uint bit = 1u << (id & 31u);
-        // A stale word costs an atomic, never a triangle.
-        if ((marked_bits[id >> 5] & bit) == 0u) {
-            atomicOr(marked_bits[id >> 5], bit);
-        }
+        mark_triangle(id);
     }
 }

@@ -17,8 +17,9 @@ use crate::{
     view,
 };
 
-/// Triangles that the first frame of a view has room for: few, since that frame is run to count what the view needs.
-const FIRST_GUESS: u32 = 1 << 12;
+/// Triangles that the first frame of a view has room for: that frame is run to count what the view needs, and its memory is
+/// given back. So few that every view of a real scene needs a hundred times as many, and what a shortage does is seen at once.
+const FIRST_GUESS: u32 = 16;
 /// Words of 32 bits for a draw's triangles.
 const WORDS_A_DRAW: u64 = DRAW_TRIANGLES as u64 / 32;
 /// Triangles of a group: `local_size_x` in `derivatives.comp.glsl`.

@@ -72,11 +72,7 @@ impl RecordSource<'_> {
     ///
     /// # Errors
     /// A tessellated frame, whose triangles have no ID; a shader that is not compiled in.
-    fn attribute_error(
-        &self,
-        graph: &mut Graph,
-        frame: &Frame<'_>,
-    ) -> Result<ImageHandle, TechniqueError> {
+    fn attribute_error(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let Some(ids) = &self.records.ids else {
             return Err(TechniqueError::Conflict {
                 technique: self.technique,
