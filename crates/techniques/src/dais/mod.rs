@@ -148,7 +148,7 @@ impl Technique for Dais {
 /// Declares the passes of `dais` for a technique with its parameters, indirect light at a low rate where one is given.
 ///
 /// # Errors
-/// What the device lacks, more triangles than the frame's references tell apart.
+/// What the device lacks, parameters that do not go together, more triangles than one binding holds.
 pub(crate) fn record(
     graph: &mut Graph,
     frame: &Frame<'_>,
