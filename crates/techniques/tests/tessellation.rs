@@ -10,9 +10,9 @@ use afterlight_techniques::{
     graph::gpu,
     registry,
     scene::{Camera, Scene},
-    shader::{Shader, compile::Compiler, manifest},
+    shader::Shader,
 };
-use common::{Stage, image_of, psnr};
+use common::{Stage, compiled, image_of, psnr, sources};
 use glam::{Affine3A, Quat, Vec3};
 
 /// Least PSNR of what must be one image, dB (contract: each full-rate variant to `deferred-dedup`).
@@ -264,25 +264,10 @@ fn image_with(
     image_of(&mut prepared.unwrap_or_else(|e| panic!("{e}")))
 }
 
-/// A shader with a part of its text replaced.
-fn mutant(name: &str, tag: &str, defines: &[&str], from: &str, to: &str) -> Shader {
-    let source = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    let (folder_name, file) = name.split_once('/').expect("folder/file");
-    let folder = source.join(folder_name);
-    let text = std::fs::read_to_string(folder.join(file)).expect("a shader");
-    assert!(text.contains(from), "{file} has changed: found no {from:?}");
-    let path = std::env::temp_dir().join(format!("afterlight-{}-{file}", std::process::id()));
-    std::fs::write(&path, text.replace(from, to)).expect("a file in the temporary folder");
-    let variant = manifest::Variant {
-        name: format!("{}{tag}", name.trim_end_matches(".glsl")),
-        stage: manifest::stage_of(file).expect("a stage"),
-        path: path.clone(),
-        folder,
-        defines: defines.iter().map(|d| ((*d).to_owned(), None)).collect(),
-    };
-    let compiled = Compiler::new().include_dir(source).compile(&variant).unwrap_or_else(|e| panic!("{e}"));
-    std::fs::remove_file(&path).expect("the file");
-    compiled.shader
+/// A variant of the shader in a file with a part of its text replaced.
+fn mutant(file: &str, tag: &str, defines: &[&str], from: &str, to: &str) -> Shader {
+    let name = format!("{}{tag}", file.trim_end_matches(".glsl"));
+    compiled(&name, &sources().join(file), defines, &[(from, to)])
 }
 
 /// Cracks are seen where there are some: displacement along normals parts the sides of the room, edges divided by what is

@@ -16,6 +16,7 @@ const WAYS: &[(&str, &[(&str, &str)])] = &[
     ("dais", &[("visibility", "raster")]),
     ("dais", &[("visibility", "compute")]),
     ("dais", &[("fill", "cache")]),
+    ("dais", &[("fill", "cache"), ("reference-bits", "8")]),
     ("dais-list", &[]),
     ("dais-multirate", &[("visibility", "raster")]),
 ];

@@ -129,7 +129,7 @@ pub fn compiled(name: &str, path: &Path, defines: &[&str], replaced: &[(&str, &s
         name: name.to_owned(),
         stage: manifest::stage_of(file).expect("a stage"),
         path: written.clone(),
-        folder: sources(),
+        folder: path.parent().expect("a folder").to_owned(),
         defines: defines.iter().map(|d| ((*d).to_owned(), None)).collect(),
     };
     let found = Compiler::new().include_dir(sources()).compile(&variant).unwrap_or_else(|e| panic!("{e}"));
