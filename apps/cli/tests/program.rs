@@ -416,6 +416,33 @@ fn bench_of_anti_aliasing_runs_on_small_images() {
     assert!(html.contains("below forward 1x") && html.contains("data:image/png;base64,"));
 }
 
+#[test]
+fn bench_dais_fig6_tells_errors_beside_the_paper() {
+    if !has_device() {
+        return;
+    }
+    let folder = folder();
+    let size = ["--width", "64", "--height", "36"];
+    let scene = ["--scenes", "builtin:colonnade?triangles=20000"];
+    let tail = ["--report", "r", "--json", "-"];
+    let output = run_in(folder.path(), &[&["bench", "dais-fig6"][..], &size, &scene, &tail].concat());
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let found = json(&output);
+    assert!(found["paper"]["says"].as_str().is_some_and(|says| says.contains("no figures")));
+    let cells = found["rows"][0]["cells"].as_array().expect("a list");
+    let dais = cells.iter().find(|cell| cell["technique"] == "dais").expect("dais runs");
+    let error = |name: &str| dais["errors"][name].as_f64().unwrap_or_else(|| panic!("{name}: {dais}"));
+    assert!(error("compared_pixels") > 0.5 * 64.0 * 36.0, "{dais}");
+    assert!((1e-9..1e-5).contains(&error("position_max")), "{dais}");
+    assert!(error("position_mean") < error("position_max") && error("texture_mean") < 0.01, "{dais}");
+    // Lists need several samples.
+    let list = cells.iter().find(|cell| cell["technique"] == "dais-list").expect("told");
+    assert!(list["status"] == "unavailable" && list["errors"].is_null(), "{list}");
+    let html = fs::read_to_string(folder.path().join("r/report.html")).expect("written");
+    assert!(html.contains("position error") && html.contains("data:image/png;base64,"));
+    refused(&["bench", "dais-fig6", "--techniques", "forward"], 2, &["forward", "dais"]);
+}
+
 /// The folder of reference scenes, beside the repository.
 fn reference_scenes() -> Option<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/scenes");
