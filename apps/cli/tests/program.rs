@@ -156,10 +156,15 @@ fn lists_are_text_and_json() {
     let list = techniques["techniques"].as_array().expect("a list");
     assert!(list.iter().any(|one| one["id"] == "forward"));
     for one in list {
-        for key in ["title", "sources", "answers", "appendix_a", "exactness", "params"] {
+        for key in ["title", "sources", "answers", "appendix_a", "exactness", "params", "views"] {
             assert!(!one[key].is_null(), "{}: {key}", one["id"]);
         }
     }
+    let dais = list.iter().find(|one| one["id"] == "dais").expect("listed");
+    assert!(
+        dais["views"].as_array().is_some_and(|views| views.contains(&"triangle-sharing".into())),
+        "{dais}"
+    );
     let plain = text(&run(&["techniques"]).stdout);
     assert!(plain.contains("forward") && plain.contains("appendix A"), "{plain}");
     let scene = json(&run(&["scene", "builtin:spheres", "--json", "-"]));

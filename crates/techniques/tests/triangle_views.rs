@@ -118,6 +118,40 @@ fn samples_of_a_record_are_counted() {
     }
 }
 
+/// Of triangles that tessellation makes, too: every sample refers to one. What they should be there is no way to tell.
+#[test]
+fn tessellated_surfaces_share_and_are_not_compared() {
+    let gpu = afterlight_testkit::gpu();
+    if !gpu.features().tessellation_shader {
+        eprintln!("skipped: the device has no tessellation shaders");
+        return;
+    }
+    let stage = Stage::new(&gpu, "builtin:edge");
+    for samples in counts(&gpu) {
+        let settings = Settings { samples, tessellate_px: Some(16.0), ..stage.settings((101, 57), 0) };
+        let white = stage.radiance(find("forward").unwrap(), &settings);
+        let covered: f64 = white.iter().map(|p| f64::from(p[0] * samples as f32)).sum();
+        for id in ["dais", "dais-list"] {
+            let technique = find(id).unwrap();
+            if !technique.info().samples.contains(&samples) {
+                continue;
+            }
+            let way = (technique, Params::default(), format!("{id}, {samples} samples"));
+            let sharing = Settings { view: view::TRIANGLE_SHARING.to_owned(), ..settings.clone() };
+            let counts = words(&mut prepared(&stage, &sharing, &way, None), technique, view::RECORD_SAMPLES);
+            let sum: f64 = counts.iter().map(|c| f64::from(*c)).sum();
+            let used = counts.iter().filter(|count| **count > 0).count();
+            println!("{}: {sum} of {covered} samples, {used} records", way.2);
+            assert_eq!(sum, covered, "{}", way.2);
+            assert!(used > 20, "{}: {used} records of triangles of 16 pixels", way.2);
+            let error = Settings { view: view::ATTRIBUTE_ERROR.to_owned(), ..settings.clone() };
+            let refused = stage.try_prepare(technique, &error, &way.1).err().expect("no ID to compare by");
+            let told = refused.to_string();
+            assert!(told.contains("attribute-error") && told.contains("tessellate"), "{told}");
+        }
+    }
+}
+
 struct Compared {
     pixels: usize,
     position_max: f64,

@@ -33,6 +33,7 @@ fn technique_json(info: &Info) -> Value {
         "needs": info.needs.iter().map(|need| need.name).collect::<Vec<_>>(),
         "samples": info.samples,
         "tessellation": info.tessellation,
+        "views": info.views,
     })
 }
 
@@ -77,6 +78,9 @@ fn technique_text(info: &Info) -> String {
     if !info.needs.is_empty() {
         let needs: Vec<&str> = info.needs.iter().map(|need| need.name).collect();
         let _ = writeln!(text, "   needs      {}", needs.join(", "));
+    }
+    if !info.views.is_empty() {
+        let _ = writeln!(text, "   views      {}", info.views.join(", "));
     }
     for param in Params::known(info) {
         let _ =
