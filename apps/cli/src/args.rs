@@ -144,8 +144,8 @@ pub struct BenchArgs {
     /// Share of the experiment's width and height; triangles go by its square
     #[arg(long, value_name = "F", default_value_t = 1.0, value_parser = share)]
     pub scale: f64,
-    /// Scenes; msaa-table2 has three of its own
-    #[arg(long, value_name = "SCENE,SCENE…", value_delimiter = ',', default_value = DEFAULT_SCENE)]
+    /// Scenes; msaa-table2 has three of its own, the dais experiments two
+    #[arg(long, alias = "scene", value_name = "SCENE,SCENE…", value_delimiter = ',', default_value = DEFAULT_SCENE)]
     pub scenes: Vec<String>,
     /// Numbers of seeded lights; msaa-table2 has its own, 5 and 50
     #[arg(long, value_name = "N,N…", value_delimiter = ',', default_value = "100,1000", value_parser = clap::value_parser!(u32).range(0..=LIGHTS_MAX))]
@@ -156,6 +156,12 @@ pub struct BenchArgs {
     /// Frames measured of each technique, after a warm-up frame
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub frames: u32,
+    /// Views along the camera path (dais-fig5, dais-fig7)
+    #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub views: u32,
+    /// Camera path, a JSON file; else a fly-through of the scene (the dais experiments)
+    #[arg(long, value_name = "FILE.json")]
+    pub path: Option<PathBuf>,
     /// Write an HTML report (report.html) and its figures (report.json) into DIR
     #[arg(long, value_name = "DIR")]
     pub report: Option<PathBuf>,

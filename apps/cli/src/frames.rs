@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::time::Instant;
 
-use afterlight_graph::FrameReport;
 use afterlight_graph::gpu::{GpuError, Statistics};
+use afterlight_graph::{FrameReport, Plan, PlannedPass, Traffic};
 use afterlight_image::{Rgba8Image, RgbaF32Image};
 use afterlight_measure::{Buffer, CostRecord, Memory, Pass, RunResult, Spread, Status};
 use afterlight_techniques::cost::Workload;
@@ -208,7 +208,7 @@ impl Trial {
         result.params = params_record(chosen);
         result.frame_ms = spread_ns(&reports, |report| report.frame_ns);
         result.record_ms = spread_ns(&reports, |report| Some(report.cpu_record_ns as f64));
-        result.passes = passes(&reports);
+        result.passes = passes(&reports, prepared.executor().plan());
         result.memory = reports.last().map(memory);
         result.counters.insert("draws".to_owned(), prepared.draw_calls.into());
         result.counters.insert("prepare_ms".to_owned(), Value::from(prepare_ms));
@@ -251,17 +251,32 @@ fn spread_ns(reports: &[FrameReport], value: impl Fn(&FrameReport) -> Option<f64
     Spread::of(&samples_ms)
 }
 
-fn passes(reports: &[FrameReport]) -> Vec<Pass> {
+fn passes(reports: &[FrameReport], plan: &Plan) -> Vec<Pass> {
     let Some(last) = reports.last() else { return Vec::new() };
     last.passes
         .iter()
         .enumerate()
-        .map(|(index, pass)| Pass {
-            name: pass.name.clone(),
-            ms: spread_ns(reports, |report| report.passes.get(index)?.time_ns),
-            statistics: pass.statistics.as_ref().map(statistics).unwrap_or_default(),
+        .map(|(index, pass)| {
+            let (reads, writes) = plan.passes.get(index).map(|pass| traffic(plan, pass)).unwrap_or_default();
+            Pass {
+                name: pass.name.clone(),
+                ms: spread_ns(reports, |report| report.passes.get(index)?.time_ns),
+                reads,
+                writes,
+                statistics: pass.statistics.as_ref().map(statistics).unwrap_or_default(),
+            }
         })
         .collect()
+}
+
+/// What a pass reads and what it writes.
+fn traffic(plan: &Plan, pass: &PlannedPass) -> (Vec<Buffer>, Vec<Buffer>) {
+    let traffic = plan.traffic(pass);
+    let of = |counts: fn(&Traffic<'_>) -> bool| {
+        let counted = traffic.iter().filter(|one| counts(one));
+        counted.map(|one| Buffer { name: one.name.to_owned(), bytes: one.bytes }).collect()
+    };
+    (of(|one| one.read), of(|one| one.written))
 }
 
 fn statistics(statistics: &Statistics) -> BTreeMap<String, u64> {
@@ -269,6 +284,7 @@ fn statistics(statistics: &Statistics) -> BTreeMap<String, u64> {
         ("input_vertices", statistics.input_vertices),
         ("input_primitives", statistics.input_primitives),
         ("vertex_invocations", statistics.vertex_invocations),
+        ("clipping_invocations", statistics.clipping_invocations),
         ("clipping_primitives", statistics.clipping_primitives),
         ("fragment_invocations", statistics.fragment_invocations),
         ("compute_invocations", statistics.compute_invocations),

@@ -1,11 +1,12 @@
 //! A scene on a device with a view of it: what `render`, `compare` and `bench` begin with.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
 use afterlight_graph::gpu::{Device, DeviceOptions};
 use afterlight_measure::{DeviceRecord, SceneRecord, SettingsRecord};
+use afterlight_scene::camera::CameraPath;
 use afterlight_scene::{Camera, LightKind, LoadOptions, Projection, Scene, camera, lights, load_source};
 use afterlight_techniques::cost::Workload;
 use afterlight_techniques::{Indirect, Params, Post, Renderer, SceneGpu, Settings, Technique, registry};
@@ -145,6 +146,22 @@ fn check_samples(device: &Device, samples: u32) -> Result<(), Failure> {
     ))
 }
 
+/// Loads a scene while the device opens; also returns the milliseconds that it took.
+fn load(source: &str, common: &CommonArgs, progress: &Progress) -> Result<(Device, Scene, f64), Failure> {
+    let start = Instant::now();
+    let spinner = progress.spinner(&format!("loading {source}"));
+    let (device, scene) = std::thread::scope(|scope| {
+        let device = scope.spawn(|| open_device(common));
+        let scene = load_source(source, &LoadOptions { time_s: common.time });
+        let device = device.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+        (device, scene)
+    });
+    spinner.finish_and_clear();
+    // A scene that does not load is told before a device that is not there: the scene is what was named.
+    let scene = scene?;
+    Ok((device?, scene, ms_since(start)))
+}
+
 impl Session {
     /// Loads a scene while the device opens, and uploads it.
     pub fn open(
@@ -153,20 +170,43 @@ impl Session {
         keep_hdr: bool,
         progress: &Progress,
     ) -> Result<Session, Failure> {
-        let start = Instant::now();
-        let spinner = progress.spinner(&format!("loading {source}"));
-        let (device, scene) = std::thread::scope(|scope| {
-            let device = scope.spawn(|| open_device(common));
-            let scene = load_source(source, &LoadOptions { time_s: common.time });
-            let device = device.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
-            (device, scene)
-        });
-        spinner.finish_and_clear();
-        // A scene that does not load is told before a device that is not there: the scene is what was named.
-        let scene = scene?;
-        let device = device?;
-        let load_ms = ms_since(start);
+        let (device, scene, load_ms) = load(source, common, progress)?;
         Session::with_device(&device, source, scene, common, keep_hdr, progress, load_ms)
+    }
+
+    /// As [`Session::open`], with a camera path: the file's, else a fly-through of the scene. The view is that of its start unless
+    /// `--camera` names another.
+    pub fn open_along(
+        source: &str,
+        common: &CommonArgs,
+        file: Option<&Path>,
+        progress: &Progress,
+    ) -> Result<(Session, CameraPath), Failure> {
+        // A path that does not read is told before a scene is loaded for it.
+        let from_file = file.map(CameraPath::load).transpose()?;
+        let (device, scene, load_ms) = load(source, common, progress)?;
+        let path = from_file.unwrap_or_else(|| CameraPath::fly_through(&scene));
+        let session = Session::with_device(&device, source, scene, common, false, progress, load_ms)?;
+        match common.camera {
+            Some(_) => Ok((session, path)),
+            None => Ok((session.look(path.at(0.0))?, path)),
+        }
+    }
+
+    /// The same scene seen by another camera.
+    fn look(self, camera: Camera) -> Result<Session, Failure> {
+        let name = camera.name.clone();
+        let (renderer, workload) = self.with_settings(|settings| settings.camera = camera)?;
+        Ok(Session { renderer, workload, camera: name, ..self })
+    }
+
+    /// A renderer of the same scene with other settings, and the cost model's symbols for its view.
+    pub fn with_settings(&self, change: impl FnOnce(&mut Settings)) -> Result<(Renderer, Workload), Failure> {
+        let mut settings = self.renderer.settings().clone();
+        change(&mut settings);
+        let renderer =
+            Renderer::with_scene(self.renderer.device(), Arc::clone(self.renderer.scene()), &settings)?;
+        Ok((renderer, workload(self.workload.objects, self.workload.object_vertices, &settings)))
     }
 
     fn with_device(
@@ -214,7 +254,7 @@ impl Session {
             draws: scene.instances.len() as u64,
             lights: settings.lights.len() as u64,
         };
-        let workload = workload(&scene, &settings);
+        let workload = workload(scene.instances.len() as f64, vertices(&scene), &settings);
         let mut warnings = scene.warnings.clone();
         warnings.extend(on_device.warnings.iter().cloned());
         drop(scene);
@@ -277,9 +317,14 @@ impl Session {
 /// Vertices of a light volume (an icosahedron subdivided once).
 const LIGHT_VOLUME_VERTICES: f64 = 42.0;
 
-/// The cost model's symbols for a view. Fragments of objects are not known before a frame is drawn: they begin as the
+/// Vertices of all instances.
+fn vertices(scene: &Scene) -> f64 {
+    scene.instances.iter().map(|one| f64::from(scene.meshes[one.mesh as usize].vertex_count)).sum()
+}
+
+/// The cost model's symbols for a view of so many objects and vertices. Fragments of objects are not known before a frame is drawn: they begin as the
 /// pixels, once covered, and are replaced by what the reference counts.
-fn workload(scene: &Scene, settings: &Settings) -> Workload {
+fn workload(objects: f64, object_vertices: f64, settings: &Settings) -> Workload {
     let pixels = f64::from(settings.width_px) * f64::from(settings.height_px);
     let lights = settings.lights.len() as f64;
     let light_fragments = settings
@@ -292,12 +337,10 @@ fn workload(scene: &Scene, settings: &Settings) -> Workload {
             }
         })
         .sum();
-    let vertices =
-        scene.instances.iter().map(|one| f64::from(scene.meshes[one.mesh as usize].vertex_count)).sum();
     Workload {
-        objects: scene.instances.len() as f64,
+        objects,
         lights,
-        object_vertices: vertices,
+        object_vertices,
         light_vertices: lights * LIGHT_VOLUME_VERTICES,
         object_fragments: pixels,
         light_fragments,

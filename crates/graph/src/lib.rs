@@ -25,5 +25,6 @@ pub use error::GraphError;
 pub use execute::{Executor, ResourceKey};
 pub use plan::{
     Access, Barrier, MemoryNeed, Placement, Plan, PlannedHeap, PlannedPass, PlannedResource, Requirements,
+    Traffic,
 };
 pub use report::{FrameReport, PassReport, ResourceReport, Statistics};

@@ -122,6 +122,19 @@ pub struct Placement {
     pub offset: u64,
 }
 
+/// A resource that the frame allocates, as one pass uses it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Traffic<'a> {
+    /// The resource's name.
+    pub name: &'a str,
+    /// Bytes by the device's memory requirements, of the whole resource.
+    pub bytes: u64,
+    /// Whether the pass reads what stood there before it.
+    pub read: bool,
+    /// Whether it writes.
+    pub written: bool,
+}
+
 /// A resource of a plan.
 #[derive(Clone)]
 pub struct PlannedResource {
@@ -194,6 +207,27 @@ impl Plan {
     pub fn resource(&self, name: &str) -> Option<ResourceId> {
         let index = self.resources.iter().position(|resource| resource.name == name)?;
         u32::try_from(index).ok().map(ResourceId)
+    }
+
+    /// What a pass reads and writes of the resources that the frame allocates, each once, in the order of first use; imported ones are
+    /// left out. How much of each it touches the plan does not know.
+    pub fn traffic(&self, pass: &PlannedPass) -> Vec<Traffic<'_>> {
+        let mut traffic: Vec<Traffic<'_>> = Vec::new();
+        for access in &pass.accesses {
+            let resource = &self.resources[access.resource.0 as usize];
+            if resource.imported {
+                continue;
+            }
+            let index = traffic.iter().position(|one| one.name == resource.name).unwrap_or_else(|| {
+                let (name, bytes) = (resource.name.as_str(), resource.need.bytes);
+                traffic.push(Traffic { name, bytes, read: false, written: false });
+                traffic.len() - 1
+            });
+            let reads = !access.discard && access.access.as_raw() & !WRITES.as_raw() != 0;
+            traffic[index].read |= reads;
+            traffic[index].written |= access.write;
+        }
+        traffic
     }
 
     /// Bytes of all heaps: the most that the frame's transient resources hold at once, as allocated.

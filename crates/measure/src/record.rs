@@ -181,6 +181,12 @@ pub struct Pass {
     pub name: String,
     /// GPU time, ms.
     pub ms: Option<Spread>,
+    /// What it reads of the buffers and images that the frame allocates, scene data left out. Bytes are of the whole resource.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub reads: Vec<Buffer>,
+    /// What it writes of them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub writes: Vec<Buffer>,
     /// Pipeline statistics of one frame (`fragment_invocations`, `vertex_invocations`, …), beside the other fields.
     #[serde(flatten)]
     pub statistics: BTreeMap<String, u64>,
@@ -248,6 +254,8 @@ mod tests {
         result.passes = vec![Pass {
             name: "tiled/shade".into(),
             ms: Spread::of(&[1.0]),
+            reads: vec![Buffer { name: "tiled/list".into(), bytes: 10 }],
+            writes: Vec::new(),
             statistics: BTreeMap::from([("fragment_invocations".into(), 7)]),
         }];
         result.memory = Some(Memory {
@@ -299,6 +307,7 @@ mod tests {
         assert_eq!(result["frame_ms"], serde_json::json!({"median": 2.0, "min": 1.0, "max": 4.0}));
         assert_eq!(result["passes"][0]["fragment_invocations"], 7);
         assert_eq!(result["passes"][0]["ms"]["median"], 1.0);
+        assert_eq!(result["passes"][0]["reads"][0]["bytes"], 10);
         assert_eq!(result["memory"]["buffers"][0]["bytes"], 10);
         assert_eq!(result["cost"]["band"], 4.0);
         assert_eq!(result["difference"]["psnr_db"], 51.5);

@@ -13,6 +13,8 @@ fn run() -> Run {
     ok.passes = vec![Pass {
         name: "tiled/shade".into(),
         ms: Spread::of(&[9.0]),
+        reads: Vec::new(),
+        writes: Vec::new(),
         statistics: [("compute_invocations".to_owned(), 1_234_567)].into(),
     }];
     ok.memory = Some(Memory { technique_bytes: 1 << 20, peak_bytes: 3 << 20, buffers: Vec::new() });

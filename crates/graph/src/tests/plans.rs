@@ -57,6 +57,31 @@ fn a_chain_shares_two_places() {
     Checker::run(&plan).expect("a sound plan");
 }
 
+/// What a pass reads is told apart from what it overwrites, and an attachment that is cleared is not read.
+#[test]
+fn traffic_is_told_by_pass() {
+    let plan = chain(2, false);
+    let told = |index: usize| {
+        let traffic = plan.traffic(&plan.passes[index]);
+        traffic.into_iter().map(|t| (t.name, t.bytes, t.read, t.written)).collect::<Vec<_>>()
+    };
+    assert_eq!(told(0), [("b0", 1024, false, true)]);
+    assert_eq!(told(1), [("b0", 1024, true, false), ("b1", 1024, false, true)]);
+
+    for (load, reads) in [(Load::Clear([0.0; 4]), false), (Load::Keep, true)] {
+        let mut g = Graph::new();
+        let image = g.image("hdr", ImageInfo::new(COLOR, 64, 64));
+        let image = g.clear_image("clear", image, [0.0; 4]);
+        let mut pass = g.raster("raster");
+        let image = pass.color(image, load);
+        pass.finish();
+        g.keep(&image);
+        let plan = g.plan(&FakeDevice).expect("a valid frame");
+        let last = plan.passes.last().expect("a pass");
+        assert_eq!(plan.traffic(last).first().map(|t| (t.read, t.written)), Some((reads, true)), "{load:?}");
+    }
+}
+
 #[test]
 fn passes_without_use_are_dropped() {
     let mut g = Graph::new();

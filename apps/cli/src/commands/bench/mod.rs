@@ -1,11 +1,13 @@
 //! `afterlight bench`: the experiments, a file each.
 
 mod antialiasing;
+mod dais;
 mod dais_fig6;
 mod msaa_table1;
 mod msaa_table2;
 mod speed;
 
+use std::borrow::Borrow;
 use std::path::Path;
 
 use afterlight_measure::{Run, RunResult, SCHEMA, Status};
@@ -39,6 +41,9 @@ const EXPERIMENTS: &[Experiment] = &[
     msaa_table1::EXPERIMENT,
     msaa_table2::EXPERIMENT,
     antialiasing::EXPERIMENT,
+    dais::table1::EXPERIMENT,
+    //dais::fig5::EXPERIMENT,
+    //dais::fig7::EXPERIMENT,
     dais_fig6::EXPERIMENT,
 ];
 
@@ -121,6 +126,29 @@ fn write_report(args: &BenchArgs, folder: &Path, outcome: &Outcome) -> Result<()
     Ok(())
 }
 
+/// Where a paper's figures stand, and what they were measured on.
+#[derive(Serialize)]
+struct PaperRecord {
+    /// Key in REFERENCES.toml.
+    key: &'static str,
+    section: &'static str,
+    device: &'static str,
+    width: u32,
+    height: u32,
+}
+
+/// 2^20 bytes: the unit of the papers' "MB", as their figures of known layouts show.
+const MIB: f64 = (1u64 << 20) as f64;
+
+/// Least triangles of a stand-in.
+const STAND_IN_TRIANGLES_MIN: u32 = 16_384;
+
+/// The colonnade that stands in for a scene of so many triangles, as many fewer as the image has fewer pixels.
+fn stand_in(triangles: u32, scale: f64) -> String {
+    let triangles = ((f64::from(triangles) * scale * scale).round() as u32).max(STAND_IN_TRIANGLES_MIN);
+    format!("builtin:colonnade?triangles={triangles}")
+}
+
 /// Anything as JSON.
 fn to_json(value: &impl Serialize) -> Result<Value, Failure> {
     serde_json::to_value(value).map_err(|error| Failure::Failed(format!("JSON: {error}")))
@@ -197,7 +225,7 @@ fn renderer_with(base: &Renderer, change: impl FnOnce(&mut Settings)) -> Result<
 /// Measures set-ups of one scene and view with frames in turn.
 fn measure(
     base: &Renderer,
-    setups: &[Setup],
+    setups: &[impl Borrow<Setup>],
     workload: &Workload,
     frames: u32,
     progress: &Progress,
@@ -205,6 +233,7 @@ fn measure(
     let renderers = setups
         .iter()
         .map(|setup| {
+            let setup = setup.borrow();
             renderer_with(base, |settings| {
                 settings.samples = setup.samples;
                 settings.post = setup.post;
@@ -214,7 +243,7 @@ fn measure(
     let entrants: Vec<Entrant<'_>> = setups
         .iter()
         .zip(&renderers)
-        .map(|(setup, renderer)| Entrant { renderer, chosen: &setup.chosen })
+        .map(|(setup, renderer)| Entrant { renderer, chosen: &setup.borrow().chosen })
         .collect();
     let bar = progress.bar("frames", u64::from(frames + 1) * setups.len() as u64);
     let found = frames::measure_in_turn(&entrants, workload, frames, budget_bytes(base), || bar.inc(1))?;

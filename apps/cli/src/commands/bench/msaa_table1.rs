@@ -12,8 +12,8 @@ use afterlight_techniques::{Params, Renderer, SceneGpu, Settings};
 use serde::Serialize;
 
 use super::{
-    Experiment, FULL_HD_PX, Outcome, Row, Setup, Table, at_size, broken_off, counter, sample_counts,
-    status_text, to_json,
+    Experiment, FULL_HD_PX, MIB, Outcome, PaperRecord, Row, Setup, Table, at_size, broken_off, counter,
+    sample_counts, status_text, to_json,
 };
 use crate::args::{BenchArgs, CommonArgs, DEFAULT_SCENE};
 use crate::failure::Failure;
@@ -26,9 +26,6 @@ use crate::text;
 /// The experiment.
 pub(super) const EXPERIMENT: Experiment =
     Experiment { name: "msaa-table1", summary: "memory of G-buffers, multisampled and as lists", run };
-
-/// The paper's unit: its figures are multiples of 2^20 bytes (1920×1080×12 of them are 23.73).
-const MIB: f64 = (1u64 << 20) as f64;
 
 /// How far a figure may be from the paper's.
 const WITHIN_PERCENT: f64 = 3.0;
@@ -205,15 +202,6 @@ struct Table1 {
     notes: Vec<String>,
     rows: Vec<Row<Cell>>,
     verdict: Verdict,
-}
-
-#[derive(Serialize)]
-struct PaperRecord {
-    key: &'static str,
-    section: &'static str,
-    device: &'static str,
-    width: u32,
-    height: u32,
 }
 
 /// Whether the paper's memory is reproduced.

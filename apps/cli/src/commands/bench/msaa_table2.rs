@@ -9,8 +9,8 @@ use afterlight_techniques::Post;
 use serde::Serialize;
 
 use super::{
-    Experiment, FILTERS, FULL_HD_PX, LISTS_PAPER_DEVICE, Outcome, Row, Setup, Table, at_size, broken_off,
-    counter, measure, number_text, reasons_text, sample_counts, status_text, to_json,
+    Experiment, FILTERS, FULL_HD_PX, LISTS_PAPER_DEVICE, Outcome, PaperRecord, Row, Setup, Table, at_size,
+    broken_off, counter, measure, number_text, reasons_text, sample_counts, stand_in, status_text, to_json,
 };
 use crate::args::{BenchArgs, CommonArgs};
 use crate::failure::Failure;
@@ -59,9 +59,6 @@ const LISTS: [(&str, &[(&str, &str)]); 3] = [
     (", raster visibility", &[("visibility", "raster")]),
     (", raster fill", &[("fill", "raster"), ("position", "depth")]),
 ];
-
-/// Least triangles of the colonnade.
-const TRIANGLES_MIN: u32 = 16_384;
 
 /// What a set-up is in the paper's table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -147,15 +144,6 @@ struct Table2 {
     scores: Vec<Score>,
 }
 
-#[derive(Serialize)]
-struct PaperRecord {
-    key: &'static str,
-    section: &'static str,
-    device: &'static str,
-    width: u32,
-    height: u32,
-}
-
 fn run(args: &BenchArgs, progress: &Progress) -> Result<Outcome, Failure> {
     let size = at_size(args, FULL_HD_PX);
     let (setups, columns): (Vec<Setup>, Vec<PaperColumn>) = setups(args)?.into_iter().unzip();
@@ -224,16 +212,11 @@ fn scenes(args: &BenchArgs) -> Vec<Scene> {
     if args.given.scenes {
         return args.scenes.iter().map(|source| Scene { source: source.clone(), paper: None }).collect();
     }
-    let stand_in = |paper: &'static PaperScene| {
-        let source = format!("builtin:colonnade?triangles={}", triangles(paper.vertices, args.scale));
-        Scene { source, paper: Some(paper) }
+    let scene = |paper: &'static PaperScene| Scene {
+        source: stand_in(paper.vertices / 3, args.scale),
+        paper: Some(paper),
     };
-    PAPER.iter().map(stand_in).collect()
-}
-
-/// Triangles of that many corners, as many fewer as the image has fewer pixels.
-fn triangles(vertices: u32, scale: f64) -> u32 {
-    ((f64::from(vertices) / 3.0 * scale * scale).round() as u32).max(TRIANGLES_MIN)
+    PAPER.iter().map(scene).collect()
 }
 
 fn lights(args: &BenchArgs) -> Vec<u32> {
@@ -475,9 +458,10 @@ mod tests {
         for scene in &PAPER {
             assert_eq!(scene.vertices % 3, 0, "{}", scene.vertices);
         }
-        assert_eq!(triangles(PAPER[2].vertices, 1.0), 7_940_056);
-        assert_eq!(triangles(PAPER[2].vertices, 0.5), 1_985_014);
-        assert_eq!(triangles(PAPER[0].vertices, 0.1), TRIANGLES_MIN);
+        let source = |index: usize, scale: &str| scenes(&args(&["--scale", scale]))[index].source.clone();
+        assert_eq!(source(2, "1"), "builtin:colonnade?triangles=7940056");
+        assert_eq!(source(2, "0.5"), "builtin:colonnade?triangles=1985014");
+        assert_eq!(source(0, "0.1"), "builtin:colonnade?triangles=16384");
     }
 
     #[test]
