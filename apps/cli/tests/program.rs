@@ -448,6 +448,136 @@ fn bench_dais_fig6_tells_errors_beside_the_paper() {
     refused(&["bench", "dais-fig6", "--techniques", "forward"], 2, &["forward", "dais"]);
 }
 
+/// Small enough for a software device: tens of pixels, tens of triangles, a view of the light of 32 texels.
+const DAIS_SMALL: [&str; 12] = [
+    "--scenes",
+    "builtin:intersect",
+    "--scale",
+    "0.03",
+    "--samples",
+    "4",
+    "--frames",
+    "1",
+    "--report",
+    "r",
+    "--json",
+    "-",
+];
+
+/// Runs an experiment and returns its JSON and its report.
+fn bench(arguments: &[&str]) -> (Value, String) {
+    let folder = folder();
+    let output = run_in(folder.path(), &[&["bench"], arguments].concat());
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let html = fs::read_to_string(folder.path().join("r/report.html")).expect("written");
+    (json(&output), html)
+}
+
+/// The cell of a column; asserts that a column without figures says why.
+fn cell<'a>(row: &'a Value, column: &str) -> &'a Value {
+    let cells = row["cells"].as_array().expect("a list");
+    let cell = cells.iter().find(|cell| cell["column"] == column);
+    let cell = cell.unwrap_or_else(|| panic!("no cell {column}"));
+    assert!(
+        cell["status"] == "ok" || cell["status"] == "unavailable" && cell["reason"].is_string(),
+        "{cell}"
+    );
+    cell
+}
+
+#[test]
+fn bench_dais_table1_has_times_memory_and_floors() {
+    if !has_device() {
+        return;
+    }
+    let rsm = ["--indirect", "rsm", "--shadow-map-size", "32"];
+    let (found, html) = bench(&[&["dais-table1"], &DAIS_SMALL[..], &rsm].concat());
+    assert_eq!((&found["schema"], &found["experiment"]), (&1.into(), &"dais-table1".into()));
+    let row = &found["rows"][0];
+    assert_eq!((&row["settings"]["width"], &row["settings"]["indirect"]), (&115.into(), &"rsm".into()));
+    assert_eq!(row["settings"]["camera"], "fly-through");
+    let deferred = cell(row, "deferred-dedup");
+    assert_eq!(deferred["status"], "ok");
+    assert_eq!(
+        (&deferred["memory_over_deferred"], &deferred["frame_over_deferred"]),
+        (&1.0.into(), &1.0.into())
+    );
+    // 20 bytes a sample, whole pages apart.
+    let least_mib = f64::from(115 * 65 * 4 * 20) / f64::from(1 << 20);
+    let total_mib = deferred["total_mib"].as_f64().expect("a number");
+    assert!(total_mib >= least_mib && total_mib < least_mib * 1.3, "{total_mib} {least_mib}");
+    for column in ["dais", "dais, fill=cache", "dais-list", "dais-multirate"] {
+        let cell = cell(row, column);
+        if cell["status"] != "ok" {
+            continue;
+        }
+        for key in ["fill_ms", "derivatives_ms", "shade_ms", "frame_ms", "memory_over_deferred", "peak_mib"] {
+            assert!(cell[key].as_f64().is_some_and(|value| value > 0.0), "{column} {key}: {cell}");
+        }
+        assert_eq!(cell["z_prepass_ms"].is_number(), column != "dais", "{column}");
+        assert!(cell["with_radiance_mib"].as_f64() > cell["total_mib"].as_f64(), "{column}");
+        let shade = cell["passes"].as_array().expect("a list").iter().find(|one| one["phase"] == "shade");
+        let shade = shade.expect("a pass");
+        assert!(shade["known_bytes"].as_u64() > Some(115 * 65 * 8), "{shade}");
+    }
+    assert!(found["bandwidth"]["gb_per_s"].as_f64().is_none_or(|rate| rate > 0.0));
+    let claims = found["claims"].as_array().expect("a list");
+    assert!(claims.iter().all(|claim| claim["met"].is_null() && claim["as_in_paper"] == false), "{claims:?}");
+    assert!(html.contains("dais, fill=cache") && html.contains("dais-list"));
+}
+
+#[test]
+fn bench_dais_fig5_follows_a_path_at_two_sizes() {
+    if !has_device() {
+        return;
+    }
+    let more = ["--views", "2", "--techniques", "deferred-dedup,dais-list", "--indirect", "rsm"];
+    let (found, html) = bench(&[&["dais-fig5", "--shadow-map-size", "32"], &DAIS_SMALL[..], &more].concat());
+    let rows = found["rows"].as_array().expect("a list");
+    let seen: Vec<_> =
+        rows.iter().map(|row| (row["settings"]["width"].as_u64(), &row["settings"]["camera"])).collect();
+    let cameras = ["fly-through at 0.000", "fly-through at 0.500"].map(Value::from);
+    let expected =
+        [58, 115].map(|width| cameras.iter().map(move |camera| (Some(width), camera))).into_iter().flatten();
+    assert_eq!(seen, expected.collect::<Vec<_>>());
+    for row in rows {
+        let deferred = cell(row, "deferred-dedup");
+        assert!(
+            deferred["geometry_ms"].as_f64() > Some(0.0) && deferred["triangles_drawn"] == 10,
+            "{deferred}"
+        );
+    }
+    let claims = found["claims"].as_array().expect("a list");
+    let of = |column: &str| claims.iter().filter(|claim| claim["column"] == column).collect::<Vec<_>>();
+    assert_eq!((of("deferred-dedup").len(), of("dais-list").len()), (1, 3), "growth; memory at two sizes");
+    let growth = of("deferred-dedup")[0];
+    assert!(
+        growth["least"].as_f64() <= growth["greatest"].as_f64() && growth["ratio"].is_number(),
+        "{growth}"
+    );
+    assert_eq!(found["curves"].as_array().map(Vec::len), Some(4));
+    assert!(html.contains("<svg") && html.contains("geometry pass, ms"), "no chart");
+    refused(&["bench", "dais-fig5", "--camera", "0"], 2, &["--camera", "--path"]);
+    refused(&["bench", "dais-fig5", "--path", "absent.json"], 2, &["absent.json"]);
+}
+
+#[test]
+fn bench_dais_fig7_counts_the_triangles_of_a_tessellation() {
+    if !has_device() {
+        return;
+    }
+    let (found, _) = bench(&[&["dais-fig7", "--views", "1"], &DAIS_SMALL[..]].concat());
+    let sizes = found["tessellation"].as_array().expect("a list");
+    assert_eq!(sizes.len(), 2);
+    for (size, row) in sizes.iter().zip(found["rows"].as_array().expect("a list")) {
+        assert_eq!(size["edge_px"], row["settings"]["tessellate_px"], "{size}");
+        let deferred = cell(row, "deferred-dedup");
+        let (drawn, counted) = (deferred["triangles_drawn"].as_u64(), size["triangles"].as_u64());
+        assert!(deferred["status"] != "ok" || drawn > Some(100) && counted > Some(100), "{size} {deferred}");
+        let _ = (cell(row, "dais"), cell(row, "dais, fill=cache"));
+    }
+}
+
 /// The folder of reference scenes, beside the repository.
 fn reference_scenes() -> Option<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/scenes");

@@ -36,7 +36,7 @@ pub fn psnr_text(psnr_db: f64) -> String {
     if psnr_db.is_infinite() { "equal".to_owned() } else { format!("{psnr_db:.1}") }
 }
 
-fn three_digits(value: f64) -> String {
+pub(crate) fn three_digits(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return format!("{value}");
     }

@@ -1,8 +1,10 @@
-//! One-file HTML reports: a summary, sortable tables, pass times as bars, pictures inlined; light and dark.
+//! One-file HTML reports: a summary, sortable tables, pass times as bars, charts, pictures inlined; light and dark.
 
+mod chart;
 mod format;
 mod page;
 
+pub use chart::{Chart, Line};
 pub use format::{bytes_text, ms_text, psnr_text};
 
 use afterlight_measure::Run;
@@ -27,6 +29,8 @@ pub struct Section<'a> {
     pub note: String,
     /// The figures.
     pub run: &'a Run,
+    /// Charts of more runs than this one.
+    pub charts: Vec<Chart>,
     /// Pictures of its techniques.
     pub pictures: Vec<Picture>,
 }

@@ -5,6 +5,7 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
+use crate::chart::charts;
 use crate::format::{bytes_text, ms_text, psnr_text};
 use crate::{Picture, Report, Section};
 
@@ -60,6 +61,7 @@ fn section(section: &Section<'_>) -> Markup {
                 "; images compared to " code { (settings.reference) }
             }
             @if !section.note.is_empty() { p { (section.note) } }
+            (charts(&section.charts))
             (table(run))
             (bars(run))
             (pictures(&section.pictures))

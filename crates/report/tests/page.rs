@@ -61,6 +61,7 @@ fn page_holds_the_figures_and_escapes_names() {
             heading: String::new(),
             note: String::new(),
             run: &run,
+            charts: Vec::new(),
             pictures: vec![Picture {
                 technique: "tiled".into(),
                 image_png: vec![1, 2, 3],

@@ -48,6 +48,7 @@ pub fn run(args: &CompareArgs) -> Result<(), Failure> {
             heading: String::new(),
             note: String::new(),
             run: &compared.run,
+            charts: Vec::new(),
             pictures: compared.pictures.clone(),
         };
         let path =

@@ -11,7 +11,7 @@ use std::borrow::Borrow;
 use std::path::Path;
 
 use afterlight_measure::{Run, RunResult, SCHEMA, Status};
-use afterlight_report::{Picture, Section};
+use afterlight_report::{Chart, Picture, Section};
 use afterlight_techniques::cost::Workload;
 use afterlight_techniques::{Params, Post, Renderer, Settings, view};
 use serde::Serialize;
@@ -42,9 +42,9 @@ const EXPERIMENTS: &[Experiment] = &[
     msaa_table2::EXPERIMENT,
     antialiasing::EXPERIMENT,
     dais::table1::EXPERIMENT,
-    //dais::fig5::EXPERIMENT,
-    //dais::fig7::EXPERIMENT,
+    dais::fig5::EXPERIMENT,
     dais_fig6::EXPERIMENT,
+    dais::fig7::EXPERIMENT,
 ];
 
 /// What an experiment found.
@@ -64,6 +64,7 @@ struct Part {
     heading: String,
     note: String,
     run: Run,
+    charts: Vec<Chart>,
     pictures: Vec<Picture>,
 }
 
@@ -118,6 +119,7 @@ fn write_report(args: &BenchArgs, folder: &Path, outcome: &Outcome) -> Result<()
             heading: part.heading.clone(),
             note: part.note.clone(),
             run: &part.run,
+            charts: part.charts.clone(),
             pictures: part.pictures.clone(),
         })
         .collect();
@@ -308,6 +310,7 @@ impl<Cell: Clone> Table<'_, Cell> {
                 heading: format!("{heading}{samples} sample{} a pixel", if samples == 1 { "" } else { "s" }),
                 note: note.to_owned(),
                 run: run_of(session, common, (samples, Post::None), frames, reference, results),
+                charts: Vec::new(),
                 pictures: Vec::new(),
             }
         };

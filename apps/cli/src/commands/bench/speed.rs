@@ -108,6 +108,7 @@ fn run(args: &BenchArgs, progress: &Progress) -> Result<Outcome, Failure> {
                 .find(|one| one.scene == run.scene.name)
                 .map_or_else(String::new, start_up_text),
             run,
+            charts: Vec::new(),
             pictures,
         })
         .collect();

@@ -2,9 +2,9 @@
 //! buffers in the paper's terms.
 
 mod account;
-//pub(super) mod fig5;
-//pub(super) mod fig7;
-//mod flight;
+pub(super) mod fig5;
+pub(super) mod fig7;
+mod flight;
 pub(super) mod table1;
 
 use afterlight_measure::{RunResult, Status};
@@ -367,6 +367,8 @@ struct Sizes {
     triangles_stored: Option<u64>,
     /// The paper's total: all but the radiance and the memoization cache.
     total_mib: Option<f64>,
+    /// The same without the room that the triangle buffer has beyond what the view needs.
+    total_without_room_mib: Option<f64>,
     /// Everything, each buffer in full.
     with_radiance_mib: Option<f64>,
     /// What is allocated at once for the frame: buffers that live at different times share memory. The final image, the light's
@@ -383,11 +385,17 @@ impl Sizes {
         let mib = |bytes: u64| bytes as f64 / MIB;
         let records = memory.buffers.iter().find(|buffer| part(&buffer.name) == "triangle buffer");
         let total = memory.buffers.iter().filter(|buffer| !NOT_IN_TOTAL.contains(&part(&buffer.name)));
+        let total_mib = mib(total.map(|buffer| buffer.bytes).sum());
+        let triangle_buffer_mib = records.map(|records| mib(records.bytes));
+        let needed_mib = triangle_buffer_mib.map(|allocated| allocated * share_needed(result));
+        let room_mib =
+            triangle_buffer_mib.zip(needed_mib).map_or(0.0, |(allocated, needed)| allocated - needed);
         Sizes {
-            triangle_buffer_mib: records.map(|records| mib(records.bytes)),
-            triangle_buffer_needed_mib: records.map(|records| mib(records.bytes) * share_needed(result)),
+            triangle_buffer_mib,
+            triangle_buffer_needed_mib: needed_mib,
             triangles_stored: counter(result, "triangles_needed"),
-            total_mib: Some(mib(total.map(|buffer| buffer.bytes).sum())),
+            total_mib: Some(total_mib),
+            total_without_room_mib: Some(total_mib - room_mib),
             with_radiance_mib: Some(mib(memory.technique_bytes)),
             peak_mib: Some(mib(memory.peak_bytes)),
         }
@@ -449,7 +457,14 @@ fn claims_text(claims: &[Claim]) -> String {
             if claim.as_in_paper { "" } else { ", under other conditions than the paper's" }
         )
     };
-    claims.iter().map(line).collect()
+    // What did not run has said so already.
+    claims.iter().filter(|claim| claim.ratio.is_some()).map(line).collect()
+}
+
+/// The notes on a section and the claims on its scene, as sentences.
+fn section_note(notes: &[String], claims: &[Claim]) -> String {
+    let claims = claims_text(claims);
+    notes.iter().map(String::as_str).chain(claims.lines()).collect::<Vec<_>>().join(". ")
 }
 
 /// What differs from the paper.
@@ -490,4 +505,116 @@ fn reasons_text<'a>(results: impl IntoIterator<Item = (&'a str, Status, Option<&
         .collect();
     lines.dedup();
     lines.concat()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::flight::tests::args;
+    use super::*;
+
+    #[test]
+    fn scenes_are_known_by_their_files() {
+        let sources = |more: &[&str]| sources(&args(more), &PAPER_SCENES);
+        let named = sources(&["--scenes", "a/Sponza.gltf,san_miguel_meshopt.gltf,builtin:edge"]);
+        let papers: Vec<_> = named.iter().map(|one| one.paper.map(|paper| paper.name)).collect();
+        assert_eq!(papers, [Some("Sponza"), Some("San Miguel"), None]);
+        assert!(named.iter().all(|one| !one.stands_in));
+        let stand_ins = sources(&["--scale", "0.5"]);
+        assert_eq!(stand_ins[1].source, "builtin:colonnade?triangles=2036465");
+        assert!(stand_ins.iter().all(|one| one.stands_in && one.paper.is_some()));
+        assert_eq!(sources(&["--scene", "a.glb"]).len(), 1);
+    }
+
+    #[test]
+    fn only_the_papers_conditions_count_as_them() {
+        let is_papers = |more: &[&str], width_px: u32| {
+            let args = args(more);
+            as_in_paper(&args, &sources(&args, &PAPER_SCENES)[0], width_px, PAPER_PX)
+        };
+        assert!(is_papers(&["--scenes", "sponza.gltf"], 3840));
+        assert!(!is_papers(&["--scenes", "sponza.gltf"], 1920));
+        assert!(!is_papers(&["--scenes", "sponza.gltf", "--samples", "4"], 3840));
+        assert!(!is_papers(&["--scenes", "other.gltf"], 3840));
+        assert!(!is_papers(&[], 3840));
+    }
+
+    #[test]
+    fn the_larger_size_is_twice_the_smaller() {
+        let of = |more: &[&str]| sizes(&args(more)).map(|size| (size.width, size.height));
+        assert_eq!(of(&[]), [(1920, 1080), (3840, 2160)]);
+        assert_eq!(of(&["--width", "100", "--height", "60", "--scale", "0.5"]), [(50, 30), (100, 60)]);
+    }
+
+    #[test]
+    fn columns_are_the_techniques_of_this_build() {
+        let all = columns(&args(&[]), &Kind::ALL).expect("known");
+        assert_eq!(all.len(), Kind::ALL.len());
+        for column in &all {
+            let info = find(column.kind.technique()).map(|technique| technique.info());
+            assert_eq!(column.setup.is_some(), info.is_some(), "{}", column.label());
+            if let (Some(setup), Some(info)) = (&column.setup, info) {
+                assert_eq!(setup.samples, PAPER_SAMPLES);
+                assert_eq!(setup.chosen.params.text(info, "cull"), "none", "{}", column.label());
+            }
+        }
+        let cache = all.iter().find(|column| column.kind == Kind::Cache).and_then(|c| c.setup.as_ref());
+        let chosen = &cache.expect("in every build").chosen;
+        assert_eq!(chosen.params.text(chosen.technique.info(), "fill"), "cache");
+        assert_eq!(columns(&args(&["--techniques", "dais"]), &Kind::ALL).expect("known").len(), 2);
+        assert!(columns(&args(&["--techniques", "tiled"]), &Kind::ALL).is_err());
+    }
+
+    #[test]
+    fn times_and_sizes_are_told_apart() {
+        let pass = |name: &str, ms: f64| serde_json::json!({"name": name, "ms": {"median": ms, "min": ms, "max": ms}});
+        let buffer = |name: &str, mib: u64| serde_json::json!({"name": name, "bytes": mib << 20});
+        let mut result = RunResult::without_figures("dais", Status::Ok, "");
+        result.passes = serde_json::from_value(serde_json::json!([
+            pass("shared/rsm", 64.0),
+            pass("dais/clear cache", 1.0),
+            pass("dais/depth", 2.0),
+            pass("dais/fill", 4.0),
+            pass("dais/size", 8.0),
+            pass("dais/derivatives", 16.0),
+            pass("dais/shade", 32.0),
+            pass("present/tonemap", 128.0),
+        ]))
+        .expect("passes");
+        result.memory = serde_json::from_value(serde_json::json!({
+            "technique_bytes": 15 << 20, "peak_bytes": 9 << 20,
+            "buffers": [buffer("dais/depth", 1), buffer("dais/triangle buffer", 2), buffer("dais/radiance", 4),
+                buffer("dais/cache entries", 8)],
+        }))
+        .ok();
+        result.counters.insert("triangles_needed".into(), 5.into());
+        result.counters.insert("triangles_capacity".into(), 20.into());
+        let times = Times::of(&result);
+        assert_eq!(
+            (times.indirect_ms, times.z_prepass_ms, times.fill_ms),
+            (Some(64.0), Some(2.0), Some(7.0))
+        );
+        assert_eq!(
+            (times.find_ms, times.derivatives_ms, times.shade_ms),
+            (Some(8.0), Some(16.0), Some(32.0))
+        );
+        assert_eq!((times.geometry_ms, times.frame_ms), (Some(31.0), None));
+        let sizes = Sizes::of(&result);
+        assert_eq!(
+            (sizes.total_mib, sizes.with_radiance_mib, sizes.peak_mib),
+            (Some(3.0), Some(15.0), Some(9.0))
+        );
+        assert_eq!((sizes.triangle_buffer_mib, sizes.triangle_buffer_needed_mib), (Some(2.0), Some(0.5)));
+        assert_eq!((sizes.triangles_stored, sizes.total_without_room_mib), (Some(5), Some(1.5)));
+    }
+
+    #[test]
+    fn what_is_dropped_fails() {
+        let columns = [Column { kind: Kind::List, setup: None }];
+        let mut result = RunResult::without_figures("dais-list", Status::Ok, "nodes: 3 samples dropped");
+        result.counters.insert("nodes_dropped".into(), 0.into());
+        assert_eq!(broken_off(&columns, std::slice::from_ref(&result)), None);
+        result.counters.insert("nodes_dropped".into(), 3.into());
+        let told = broken_off(&columns, &[result]).expect("fails");
+        assert!(told.contains("dais-list") && told.contains("3 samples"), "{told}");
+    }
 }

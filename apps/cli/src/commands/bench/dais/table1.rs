@@ -12,7 +12,7 @@ use super::account::{Accounted, Bandwidth, account};
 use super::{
     Claim, Column, Kind, PAPER_PX, PAPER_SCENES, PaperRow, Sizes, Source, Times, as_in_paper, at_most,
     broken_off, claims_text, columns, measure_columns, number_text, paper_record, reasons_text, samples,
-    sources, status_text, with_indirect,
+    section_note, sources, status_text, with_indirect,
 };
 use crate::args::{BenchArgs, CommonArgs};
 use crate::commands::bench::{
@@ -90,6 +90,7 @@ fn run(args: &BenchArgs, progress: &Progress) -> Result<Outcome, Failure> {
         session.finish(&common, common.quiet)?;
         failed = failed.or_else(|| broken_off(&columns, &results));
         let cells = cells(&columns, &results, source, bandwidth);
+        let first_claim = claims.len();
         claims.extend(claims_of(source, &columns, &cells, as_in_paper(args, source, common.width, PAPER_PX)));
         if !common.quiet {
             output::tell(&args.json, &scene_text(&session, source, args, &common, &cells, bandwidth));
@@ -100,8 +101,9 @@ fn run(args: &BenchArgs, progress: &Progress) -> Result<Outcome, Failure> {
             results.iter().zip(&cells).map(|(result, cell)| labelled(result, cell.column, remark(cell)));
         sections.push(Part {
             heading: source.title(),
-            note: notes.join(". "),
+            note: section_note(&notes, &claims[first_claim..]),
             run: run_with(remarked.collect()),
+            charts: Vec::new(),
             pictures: Vec::new(),
         });
         rows.push(Row { run: run_with(results), cells });
@@ -282,6 +284,7 @@ fn sizes_table(cells: &[Cell]) -> comfy_table::Table {
         "needed",
         "total",
         "/ deferred",
+        "without room",
         "with radiance",
         "peak",
         "paper: triangles",
@@ -297,6 +300,7 @@ fn sizes_table(cells: &[Cell]) -> comfy_table::Table {
             number_text(sizes.triangle_buffer_needed_mib, 2),
             number_text(sizes.total_mib, 2),
             number_text(cell.memory_over_deferred, 2),
+            number_text(sizes.total_without_room_mib, 2),
             number_text(sizes.with_radiance_mib, 2),
             number_text(sizes.peak_mib, 2),
             number_text(cell.paper.and_then(|paper| paper.triangle_buffer_mib), 2),
