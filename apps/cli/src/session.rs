@@ -175,10 +175,11 @@ impl Session {
     }
 
     /// As [`Session::open`], with a camera path: the file's, else a fly-through of the scene. The view is that of its start unless
-    /// `--camera` names another.
+    /// `--camera` names another. Where indirect light is asked for and there is no light, neither the scene's nor seeded ones,
+    /// one seeded light is put in, and `common` says so.
     pub fn open_along(
         source: &str,
-        common: &CommonArgs,
+        common: &mut CommonArgs,
         file: Option<&Path>,
         progress: &Progress,
     ) -> Result<(Session, CameraPath), Failure> {
@@ -186,6 +187,9 @@ impl Session {
         let from_file = file.map(CameraPath::load).transpose()?;
         let (device, scene, load_ms) = load(source, common, progress)?;
         let path = from_file.unwrap_or_else(|| CameraPath::fly_through(&scene));
+        if common.indirect != args::Indirect::None && common.lights == 0 && scene.lights.is_empty() {
+            common.lights = 1;
+        }
         let session = Session::with_device(&device, source, scene, common, false, progress, load_ms)?;
         match common.camera {
             Some(_) => Ok((session, path)),

@@ -496,6 +496,7 @@ fn bench_dais_table1_has_times_memory_and_floors() {
     let row = &found["rows"][0];
     assert_eq!((&row["settings"]["width"], &row["settings"]["indirect"]), (&115.into(), &"rsm".into()));
     assert_eq!(row["settings"]["camera"], "fly-through");
+    assert_eq!(row["scene"]["lights"], 1, "the scene's own");
     let deferred = cell(row, "deferred-dedup");
     assert_eq!(deferred["status"], "ok");
     assert_eq!(
@@ -514,6 +515,13 @@ fn bench_dais_table1_has_times_memory_and_floors() {
         for key in ["fill_ms", "derivatives_ms", "shade_ms", "frame_ms", "memory_over_deferred", "peak_mib"] {
             assert!(cell[key].as_f64().is_some_and(|value| value > 0.0), "{column} {key}: {cell}");
         }
+        // The baseline's image; shading at half the rate is another.
+        let results = row["results"].as_array().expect("a list");
+        let index =
+            row["cells"].as_array().and_then(|all| all.iter().position(|one| one == cell)).expect("there");
+        let psnr_db = results[index]["difference"]["psnr_db"].as_f64().expect("a number");
+        let least_db = if column == "dais-multirate" { 25.0 } else { 40.0 };
+        assert!(psnr_db >= least_db, "{column}: {psnr_db} dB");
         assert_eq!(cell["z_prepass_ms"].is_number(), column != "dais", "{column}");
         assert!(cell["with_radiance_mib"].as_f64() > cell["total_mib"].as_f64(), "{column}");
         let shade = cell["passes"].as_array().expect("a list").iter().find(|one| one["phase"] == "shade");
@@ -524,6 +532,29 @@ fn bench_dais_table1_has_times_memory_and_floors() {
     let claims = found["claims"].as_array().expect("a list");
     assert!(claims.iter().all(|claim| claim["met"].is_null() && claim["as_in_paper"] == false), "{claims:?}");
     assert!(html.contains("dais, fill=cache") && html.contains("dais-list"));
+
+    // Indirect light needs a light: a scene without one gets one, and the record says so.
+    let dark = [
+        "dais-table1",
+        "--techniques",
+        "dais",
+        "--scenes",
+        "builtin:edge",
+        "--scale",
+        "0.01",
+        "--samples",
+        "4",
+    ];
+    let (found, _) = bench(&[&dark[..], &["--frames", "1", "--report", "r", "--json", "-"], &rsm].concat());
+    let row = &found["rows"][0];
+    assert_eq!((&row["scene"]["lights"], &row["settings"]["light_seed"]), (&1.into(), &1.into()));
+    assert!(
+        found["notes"]
+            .as_array()
+            .expect("a list")
+            .iter()
+            .any(|note| note.as_str().is_some_and(|n| n.contains("no light")))
+    );
 }
 
 #[test]

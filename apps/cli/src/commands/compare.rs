@@ -187,7 +187,7 @@ fn judge(result: &mut RunResult, info: &Info, psnr_db: f64, common: &CommonArgs,
 }
 
 /// What a report shows of a technique's image; none where there is none.
-fn picture(measured: &Measured, truth: &Rgba8Image) -> Result<Option<Picture>, Failure> {
+pub fn picture(measured: &Measured, truth: &Rgba8Image) -> Result<Option<Picture>, Failure> {
     let (Some(image), Some(difference)) = (&measured.image, measured.result.difference) else {
         return Ok(None);
     };

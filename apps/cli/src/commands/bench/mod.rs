@@ -139,6 +139,23 @@ struct PaperRecord {
     height: u32,
 }
 
+/// What the JSON of an experiment beside a paper begins with.
+#[derive(Serialize)]
+struct Header {
+    schema: u32,
+    experiment: &'static str,
+    scale: f64,
+    paper: PaperRecord,
+    /// What differs from the paper, and what stood in.
+    notes: Vec<String>,
+}
+
+impl Header {
+    fn new(experiment: &'static str, args: &BenchArgs, paper: PaperRecord, notes: Vec<String>) -> Header {
+        Header { schema: SCHEMA, experiment, scale: args.scale, paper, notes }
+    }
+}
+
 /// 2^20 bytes: the unit of the papers' "MB", as their figures of known layouts show.
 const MIB: f64 = (1u64 << 20) as f64;
 

@@ -6,14 +6,14 @@
 
 use afterlight_graph::gpu::vk;
 use afterlight_graph::{Graph, ImageHandle, ImageInfo, Load};
-use afterlight_measure::{Buffer, Memory, RunResult, SCHEMA, Status};
+use afterlight_measure::{Buffer, Memory, RunResult, Status};
 use afterlight_scene::{LoadOptions, load_source};
 use afterlight_techniques::{Params, Renderer, SceneGpu, Settings};
 use serde::Serialize;
 
 use super::{
-    Experiment, FULL_HD_PX, MIB, Outcome, PaperRecord, Row, Setup, Table, at_size, broken_off, counter,
-    sample_counts, status_text, to_json,
+    Experiment, FULL_HD_PX, Header, MIB, Outcome, PaperRecord, Row, Setup, Table, at_size, broken_off,
+    counter, sample_counts, status_text, to_json,
 };
 use crate::args::{BenchArgs, CommonArgs, DEFAULT_SCENE};
 use crate::failure::Failure;
@@ -193,13 +193,10 @@ impl Cell {
 /// What `bench msaa-table1` writes as JSON.
 #[derive(Serialize)]
 struct Table1 {
-    schema: u32,
-    experiment: &'static str,
-    scale: f64,
-    paper: PaperRecord,
+    #[serde(flatten)]
+    header: Header,
     /// The share of the paper's pixels: its figures are multiplied by it.
     pixel_share: f64,
-    notes: Vec<String>,
     rows: Vec<Row<Cell>>,
     verdict: Verdict,
 }
@@ -262,19 +259,16 @@ fn run(args: &BenchArgs, progress: &Progress) -> Result<Outcome, Failure> {
     };
     let rows = table.rows(&session, &common, 1, "none");
     let sections = table.parts(&session, &common, 1, "none", "", &notes.join(". "));
+    let paper = PaperRecord {
+        key: "fridvalszky-2020",
+        section: "Table 1, Figure 9",
+        device: "GTX 970 and GTX 1050",
+        width: FULL_HD_PX.0,
+        height: FULL_HD_PX.1,
+    };
     let json = to_json(&Table1 {
-        schema: SCHEMA,
-        experiment: EXPERIMENT.name,
-        scale: args.scale,
-        paper: PaperRecord {
-            key: "fridvalszky-2020",
-            section: "Table 1, Figure 9",
-            device: "GTX 970 and GTX 1050",
-            width: FULL_HD_PX.0,
-            height: FULL_HD_PX.1,
-        },
+        header: Header::new(EXPERIMENT.name, args, paper, notes),
         pixel_share: pixel_share(pixels),
-        notes,
         rows,
         verdict,
     })?;

@@ -3,14 +3,15 @@
 //!
 //! Times of two devices are not compared; ratios of techniques on one are.
 
-use afterlight_measure::{RunResult, SCHEMA, Spread, Status};
+use afterlight_measure::{RunResult, Spread, Status};
 use afterlight_report::{bytes_text, ms_text};
 use afterlight_techniques::Post;
 use serde::Serialize;
 
 use super::{
-    Experiment, FILTERS, FULL_HD_PX, LISTS_PAPER_DEVICE, Outcome, PaperRecord, Row, Setup, Table, at_size,
-    broken_off, counter, measure, number_text, reasons_text, sample_counts, stand_in, status_text, to_json,
+    Experiment, FILTERS, FULL_HD_PX, Header, LISTS_PAPER_DEVICE, Outcome, PaperRecord, Row, Setup, Table,
+    at_size, broken_off, counter, measure, number_text, reasons_text, sample_counts, stand_in, status_text,
+    to_json,
 };
 use crate::args::{BenchArgs, CommonArgs};
 use crate::failure::Failure;
@@ -134,11 +135,8 @@ struct Score {
 /// What `bench msaa-table2` writes as JSON.
 #[derive(Serialize)]
 struct Table2 {
-    schema: u32,
-    experiment: &'static str,
-    scale: f64,
-    paper: PaperRecord,
-    notes: Vec<String>,
+    #[serde(flatten)]
+    header: Header,
     rows: Vec<Row<Cell>>,
     duels: Vec<Duel>,
     scores: Vec<Score>,
@@ -188,22 +186,15 @@ fn run(args: &BenchArgs, progress: &Progress) -> Result<Outcome, Failure> {
     if !args.common.quiet {
         output::tell(&args.json, &verdict_text(&duels, &scores, &notes));
     }
-    let json = to_json(&Table2 {
-        schema: SCHEMA,
-        experiment: EXPERIMENT.name,
-        scale: args.scale,
-        paper: PaperRecord {
-            key: "fridvalszky-2020",
-            section: "Table 2",
-            device: LISTS_PAPER_DEVICE,
-            width: FULL_HD_PX.0,
-            height: FULL_HD_PX.1,
-        },
-        notes,
-        rows,
-        duels,
-        scores,
-    })?;
+    let paper = PaperRecord {
+        key: "fridvalszky-2020",
+        section: "Table 2",
+        device: LISTS_PAPER_DEVICE,
+        width: FULL_HD_PX.0,
+        height: FULL_HD_PX.1,
+    };
+    let header = Header::new(EXPERIMENT.name, args, paper, notes);
+    let json = to_json(&Table2 { header, rows, duels, scores })?;
     Ok(Outcome { title: "Frame times of anti-aliased deferred shading", json, sections, failed })
 }
 

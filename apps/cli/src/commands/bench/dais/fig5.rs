@@ -1,18 +1,14 @@
 //! `bench dais-fig5`: time of the geometry pass, time of shading and memory along a camera path at two sizes (Schied and
 //! Dachsbacher 2015, Figure 5).
 
-use afterlight_measure::SCHEMA;
-use serde::Serialize;
-
-use super::flight::{Curve, Flight, ViewCell, claim, fly, open, ratios};
+use super::flight::{Flight, Gathered, claim, fly, open, ratios};
 use super::{
-    Claim, Column, Kind, PAPER_PX, PAPER_SCENES, Source, as_in_paper, at_most, claims_text, columns,
-    paper_record, section_note, sizes, sources, with_indirect,
+    Claim, Column, Kind, PAPER_SCENES, Source, as_in_paper, at_most, columns, session_notes, sizes, sources,
+    with_indirect,
 };
 use crate::args::BenchArgs;
-use crate::commands::bench::{Experiment, Outcome, PaperRecord, Row, to_json};
+use crate::commands::bench::{Experiment, Outcome};
 use crate::failure::Failure;
-use crate::output;
 use crate::progress::Progress;
 
 /// The experiment.
@@ -29,66 +25,30 @@ const GROWTH_MAX: f64 = 1.45;
 /// What the G-buffer's grows by more than.
 const DEFERRED_GROWTH: f64 = 2.0;
 
-/// What `bench dais-fig5` writes as JSON.
-#[derive(Serialize)]
-struct Fig5 {
-    schema: u32,
-    experiment: &'static str,
-    scale: f64,
-    paper: PaperRecord,
-    notes: Vec<String>,
-    views: u32,
-    rows: Vec<Row<ViewCell>>,
-    curves: Vec<Curve>,
-    claims: Vec<Claim>,
-}
-
 fn run(args: &BenchArgs, progress: &Progress) -> Result<Outcome, Failure> {
-    let sizes = sizes(args).map(with_indirect);
+    let asked = sizes(args).map(with_indirect);
     let columns = columns(args, &Kind::ALL)?;
     let sources = sources(args, &PAPER_SCENES);
-    let mut notes = super::notes(args, &sources, sizes[1].width, PAPER_PX);
-    let (mut rows, mut sections, mut curves) = (Vec::new(), Vec::new(), Vec::new());
-    let (mut claims, mut failed) = (Vec::new(), None);
+    let notes = super::notes(args, &sources, asked[1].width);
+    let mut gathered = Gathered::new(notes);
     for source in &sources {
-        let (session, path) = open(source, &sizes[0], args, progress)?;
-        notes.extend(session.renderer.warnings());
+        let mut sizes = asked.clone();
+        let (session, path) = open(source, &mut sizes[0], args, progress)?;
+        sizes[1].lights = sizes[0].lights;
+        gathered.notes.extend(session_notes(&session, source, &asked[0], &sizes[0]));
         let mut flights = Vec::new();
         for common in &sizes {
-            let flight = fly((&session, &path), source, &columns, common, args, progress)?;
-            let of_flight = flight.curves(&columns);
-            if !common.quiet {
-                output::tell(&args.json, &flight.text(EXPERIMENT.name, &session, args, &of_flight));
-            }
-            curves.extend(of_flight);
-            failed = failed.or_else(|| flight.failed.clone());
-            flights.push(flight);
+            let along = (&session, &path);
+            flights.push(fly(EXPERIMENT.name, along, source, &columns, common, args, progress)?);
         }
         session.finish(&sizes[0], sizes[0].quiet)?;
-        let first_claim = claims.len();
-        let is_papers = as_in_paper(args, source, sizes[1].width, PAPER_PX);
-        claims.extend(growth_claims(source, &columns, &flights, is_papers));
+        let is_papers = as_in_paper(args, source, sizes[1].width);
+        let mut claims = growth_claims(source, &columns, &flights, is_papers);
         claims.extend(memory_claims(source, &columns, &flights, is_papers));
-        let note = section_note(&notes, &claims[first_claim..]);
-        sections.extend(flights.iter().map(|flight| flight.part(&columns, &note)));
-        rows.extend(flights.into_iter().flat_map(|flight| flight.rows));
+        gathered.add(flights, &columns, claims);
     }
-    if !args.common.quiet {
-        let told: String = notes.iter().map(|note| format!("note: {note}\n")).collect();
-        output::tell(&args.json, &format!("{}{told}", claims_text(&claims)));
-    }
-    let json = to_json(&Fig5 {
-        schema: SCHEMA,
-        experiment: EXPERIMENT.name,
-        scale: args.scale,
-        paper: paper_record("Figure 5", PAPER_PX),
-        notes,
-        views: args.views,
-        rows,
-        curves,
-        claims,
-    })?;
-    Ok(Outcome { title: "Deferred attribute interpolation along a camera path", json, sections, failed })
+    let title = "Deferred attribute interpolation along a camera path";
+    gathered.outcome(args, EXPERIMENT.name, "Figure 5", title)
 }
 
 /// The time of the geometry pass at twice the width and height over that at once, view by view.

@@ -1,22 +1,18 @@
 //! `bench dais-fig7`: time of the geometry pass and memory along a camera path, surfaces tessellated to triangles of about one
 //! size (Schied and Dachsbacher 2015, Figure 7).
 
-use afterlight_measure::SCHEMA;
+use afterlight_measure::Spread;
 use afterlight_scene::camera::CameraPath;
 use afterlight_techniques::Params;
 use afterlight_techniques::geometry::{MAX_TESSELLATE_PX, MIN_TESSELLATE_PX};
 use serde::Serialize;
 
-use super::flight::{Curve, Flight, ViewCell, claim, fly, open, places, ratios, triangles_drawn};
-use super::{
-    Claim, Column, Kind, PAPER_PX, PAPER_SCENES, Source, as_in_paper, claims_text, columns, paper_record,
-    section_note, sizes, sources,
-};
+use super::flight::{Flight, Gathered, ViewCell, claim, fly, open, places, ratios, triangles_drawn};
+use super::{Claim, Column, Kind, PAPER_PX, PAPER_SCENES, Source, as_in_paper, columns, sizes, sources};
 use crate::args::{BenchArgs, CommonArgs};
-use crate::commands::bench::{Experiment, FULL_HD_PX, Outcome, PaperRecord, Row, to_json};
+use crate::commands::bench::{Experiment, FULL_HD_PX, Outcome};
 use crate::failure::Failure;
 use crate::frames;
-use crate::output;
 use crate::progress::Progress;
 use crate::session::{Chosen, Session, technique};
 use crate::text;
@@ -41,7 +37,7 @@ const NEAR: f64 = 0.05;
 
 /// The length of edges of a size, and what it makes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-struct Tessellation {
+pub(super) struct Tessellation {
     width: u32,
     height: u32,
     edge_px: f32,
@@ -51,73 +47,34 @@ struct Tessellation {
     paper_triangles: f64,
 }
 
-/// What `bench dais-fig7` writes as JSON.
-#[derive(Serialize)]
-struct Fig7 {
-    schema: u32,
-    experiment: &'static str,
-    scale: f64,
-    paper: PaperRecord,
-    notes: Vec<String>,
-    views: u32,
-    tessellation: Vec<Tessellation>,
-    rows: Vec<Row<ViewCell>>,
-    curves: Vec<Curve>,
-    claims: Vec<Claim>,
-}
-
 fn run(args: &BenchArgs, progress: &Progress) -> Result<Outcome, Failure> {
     let sizes = sizes(args);
     let columns = columns(args, &[Kind::Deferred, Kind::Resolve, Kind::Cache])?;
     let sources = sources(args, &PAPER_SCENES[..1]);
-    let mut notes = super::notes(args, &sources, sizes[1].width, PAPER_PX);
+    let mut notes = super::notes(args, &sources, sizes[1].width);
     notes.push("patches out of view or facing away make no triangles here; the paper culled none".to_owned());
-    let (mut rows, mut sections, mut curves) = (Vec::new(), Vec::new(), Vec::new());
-    let (mut claims, mut failed, mut tessellation) = (Vec::new(), None, Vec::new());
+    let mut gathered = Gathered::new(notes);
     for source in &sources {
-        let (session, path) = open(source, &sizes[0], args, progress)?;
+        let (session, path) = open(source, &mut sizes[0].clone(), args, progress)?;
         let mut flights = Vec::new();
         for (common, (paper_px, paper_triangles)) in sizes.iter().zip(PAPER_TRIANGLES) {
             let pixels = |(width, height): (u32, u32)| f64::from(width) * f64::from(height);
             let target = paper_triangles * pixels((common.width, common.height)) / pixels(paper_px);
             let chosen = choose_edge(&session, &path, common, target, args)?;
-            notes.push(edge_note(&chosen));
+            gathered.notes.push(edge_note(&chosen));
             let common = CommonArgs { tessellate: Some(chosen.edge_px), ..common.clone() };
-            tessellation.push(chosen);
-            let flight = fly((&session, &path), source, &columns, &common, args, progress)?;
-            let of_flight = flight.curves(&columns);
-            if !common.quiet {
-                output::tell(&args.json, &flight.text(EXPERIMENT.name, &session, args, &of_flight));
-            }
-            curves.extend(of_flight);
-            failed = failed.or_else(|| flight.failed.clone());
-            flights.push(flight);
+            gathered.tessellation.push(chosen);
+            let along = (&session, &path);
+            flights.push(fly(EXPERIMENT.name, along, source, &columns, &common, args, progress)?);
         }
         session.finish(&sizes[0], sizes[0].quiet)?;
-        let first_claim = claims.len();
-        let is_papers = as_in_paper(args, source, sizes[1].width, PAPER_PX);
-        claims.extend(flights.iter().flat_map(|flight| claims_of(source, &columns, flight, is_papers)));
-        let note = section_note(&notes, &claims[first_claim..]);
-        sections.extend(flights.iter().map(|flight| flight.part(&columns, &note)));
-        rows.extend(flights.into_iter().flat_map(|flight| flight.rows));
+        let is_papers = as_in_paper(args, source, sizes[1].width);
+        let claims =
+            flights.iter().flat_map(|flight| claims_of(source, &columns, flight, is_papers)).collect();
+        gathered.add(flights, &columns, claims);
     }
-    if !args.common.quiet {
-        let told: String = notes.iter().map(|note| format!("note: {note}\n")).collect();
-        output::tell(&args.json, &format!("{}{told}", claims_text(&claims)));
-    }
-    let json = to_json(&Fig7 {
-        schema: SCHEMA,
-        experiment: EXPERIMENT.name,
-        scale: args.scale,
-        paper: paper_record("Figure 7", PAPER_PX),
-        notes,
-        views: args.views,
-        tessellation,
-        rows,
-        curves,
-        claims,
-    })?;
-    Ok(Outcome { title: "Deferred attribute interpolation of tessellated surfaces", json, sections, failed })
+    let title = "Deferred attribute interpolation of tessellated surfaces";
+    gathered.outcome(args, EXPERIMENT.name, "Figure 7", title)
 }
 
 /// The length of edges that makes about `target` triangles in the view that has most of them.
@@ -205,7 +162,7 @@ fn claims_of(source: &Source, columns: &[Column], flight: &Flight, as_in_paper: 
         let time = format!(
             "at {width} pixels wide, geometry pass over deferred shading's (the paper: longer at 1920, about as long at 3840)"
         );
-        let found = |text: &str, ratios: &[f64], met: fn(afterlight_measure::Spread) -> Option<bool>| {
+        let found = |text: &str, ratios: &[f64], met: fn(Spread) -> Option<bool>| {
             claim(text, source.title(), column.label(), ratios, None, as_in_paper, met)
         };
         [

@@ -6,13 +6,15 @@ use afterlight_scene::camera::CameraPath;
 use afterlight_techniques::Post;
 use serde::Serialize;
 
+use super::fig7::Tessellation;
 use super::{
-    Claim, Column, Kind, Phase, Sizes, Source, Times, broken_off, measure_columns, number_text, phase,
-    reasons_text, samples, status_text,
+    Claim, Column, Kind, Phase, Sizes, Source, Times, broken_off, measure_columns, number_text, paper_record,
+    phase, reasons_text, samples, section_note, status_text, verdict_text,
 };
 use crate::args::{BenchArgs, CommonArgs};
-use crate::commands::bench::{Part, Row, labelled, run_of};
+use crate::commands::bench::{Header, Outcome, Part, Row, labelled, run_of, to_json};
 use crate::failure::Failure;
+use crate::output;
 use crate::progress::Progress;
 use crate::session::Session;
 use crate::text;
@@ -40,8 +42,71 @@ pub(super) struct ViewCell {
 pub(super) struct Flight {
     scene: String,
     common: CommonArgs,
-    pub(super) rows: Vec<Row<ViewCell>>,
-    pub(super) failed: Option<String>,
+    rows: Vec<Row<ViewCell>>,
+    failed: Option<String>,
+}
+
+/// What an experiment with camera paths writes as JSON.
+#[derive(Serialize)]
+struct Figure {
+    #[serde(flatten)]
+    header: Header,
+    /// Views along each path.
+    views: u32,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    tessellation: Vec<Tessellation>,
+    /// A row a view.
+    rows: Vec<Row<ViewCell>>,
+    /// A column at one size over all views.
+    curves: Vec<Curve>,
+    claims: Vec<Claim>,
+}
+
+/// What an experiment's flights have given so far.
+#[derive(Default)]
+pub(super) struct Gathered {
+    pub(super) notes: Vec<String>,
+    pub(super) tessellation: Vec<Tessellation>,
+    rows: Vec<Row<ViewCell>>,
+    curves: Vec<Curve>,
+    claims: Vec<Claim>,
+    sections: Vec<Part>,
+    failed: Option<String>,
+}
+
+impl Gathered {
+    pub fn new(notes: Vec<String>) -> Gathered {
+        Gathered { notes, ..Gathered::default() }
+    }
+
+    /// Adds a scene's flights with the claims on them.
+    pub fn add(&mut self, flights: Vec<Flight>, columns: &[Column], claims: Vec<Claim>) {
+        let note = section_note(&self.notes, &claims);
+        self.claims.extend(claims);
+        for flight in flights {
+            self.sections.push(flight.part(columns, &note));
+            self.curves.extend(flight.curves(columns));
+            self.failed = self.failed.take().or(flight.failed);
+            self.rows.extend(flight.rows);
+        }
+    }
+
+    /// Tells the claims and the notes.
+    pub fn outcome(
+        self,
+        args: &BenchArgs,
+        experiment: &'static str,
+        section: &'static str,
+        title: &'static str,
+    ) -> Result<Outcome, Failure> {
+        let Gathered { notes, tessellation, rows, curves, claims, sections, failed } = self;
+        if !args.common.quiet {
+            output::tell(&args.json, &verdict_text(&claims, &notes));
+        }
+        let header = Header::new(experiment, args, paper_record(section), notes);
+        let json = to_json(&Figure { header, views: args.views, tessellation, rows, curves, claims })?;
+        Ok(Outcome { title, json, sections, failed })
+    }
 }
 
 /// A column over the views of a flight: median, least and greatest of the views.
@@ -72,7 +137,7 @@ pub(super) fn places(path: &CameraPath, count: u32) -> impl Iterator<Item = f32>
 /// Opens a scene whose views go along a path.
 pub(super) fn open(
     source: &Source,
-    common: &CommonArgs,
+    common: &mut CommonArgs,
     args: &BenchArgs,
     progress: &Progress,
 ) -> Result<(Session, CameraPath), Failure> {
@@ -83,8 +148,9 @@ pub(super) fn open(
     Session::open_along(&source.source, common, args.path.as_deref(), progress)
 }
 
-/// Measures columns in every view, frames in turn.
+/// Measures columns in every view, frames in turn, and tells what it found.
 pub(super) fn fly(
+    experiment: &str,
     (session, path): (&Session, &CameraPath),
     source: &Source,
     columns: &[Column],
@@ -99,13 +165,17 @@ pub(super) fn fly(
             settings.tessellate_px = common.tessellate;
             settings.camera = path.at(at);
         })?;
-        let (results, _) = measure_columns(&renderer, columns, &workload, args.frames, progress)?;
+        let (measured, _) = measure_columns(&renderer, columns, &workload, args.frames, progress)?;
+        let results: Vec<RunResult> = measured.into_iter().map(|one| one.result).collect();
         flight.failed = flight.failed.or_else(|| broken_off(columns, &results));
         let cells = columns.iter().zip(&results).map(|(column, result)| cell(column, result, at)).collect();
         let setting = (samples(args), Post::None);
         let mut run = run_of(session, common, setting, args.frames, "none", results);
         run.settings.camera = format!("{} at {at:.3}", path.name);
         flight.rows.push(Row { run, cells });
+    }
+    if !common.quiet {
+        output::tell(&args.json, &flight.text(experiment, session, args, &flight.curves(columns)));
     }
     Ok(flight)
 }
@@ -166,12 +236,12 @@ impl Flight {
         }
     }
 
-    pub fn curves(&self, columns: &[Column]) -> Vec<Curve> {
+    fn curves(&self, columns: &[Column]) -> Vec<Curve> {
         columns.iter().map(|column| self.curve(column)).collect()
     }
 
     /// A section of a report: charts over the views, and the figures of the first.
-    pub fn part(&self, columns: &[Column], note: &str) -> Part {
+    fn part(&self, columns: &[Column], note: &str) -> Part {
         let labels = columns.iter().map(Column::label);
         let mut run = self.rows[0].run.clone();
         run.results =
@@ -202,7 +272,7 @@ impl Flight {
     }
 
     /// What the terminal shows.
-    pub fn text(&self, experiment: &str, session: &Session, args: &BenchArgs, curves: &[Curve]) -> String {
+    fn text(&self, experiment: &str, session: &Session, args: &BenchArgs, curves: &[Curve]) -> String {
         let device = &session.device;
         let tessellated =
             self.common.tessellate.map_or_else(String::new, |px| format!(", tessellated to {px:.2} pixels"));

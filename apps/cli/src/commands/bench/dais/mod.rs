@@ -15,8 +15,9 @@ use serde::Serialize;
 use super::{MIB, PaperRecord, Setup, at_size, counter, measure, number_text, stand_in, status_text};
 use crate::args::{self, BenchArgs, CommonArgs};
 use crate::failure::Failure;
+use crate::frames::Measured;
 use crate::progress::Progress;
-use crate::session;
+use crate::session::{self, Session};
 
 /// What the paper measured on.
 const PAPER_DEVICE: &str = "GeForce GTX 980";
@@ -196,27 +197,25 @@ fn samples(args: &BenchArgs) -> u32 {
     if args.given.samples { args.common.samples } else { PAPER_SAMPLES }
 }
 
-/// Results of columns in their order, frames in turn, and the groups in which they took turns.
+/// What columns measured in their order, frames in turn, and the groups in which they took turns.
 fn measure_columns(
     base: &Renderer,
     columns: &[Column],
     workload: &Workload,
     frames: u32,
     progress: &Progress,
-) -> Result<(Vec<RunResult>, usize), Failure> {
+) -> Result<(Vec<Measured>, usize), Failure> {
     let there: Vec<&Setup> = columns.iter().filter_map(|column| column.setup.as_ref()).collect();
     let found = measure(base, &there, workload, frames, progress)?;
     let mut measured = found.measured.into_iter();
-    let result = |column: &Column| {
-        column.setup.as_ref().and_then(|_| measured.next()).map_or_else(
-            || {
-                let technique = column.kind.technique();
-                RunResult::without_figures(technique, Status::Unavailable, "not in this build")
-            },
-            |one| one.result,
-        )
+    let of_column = |column: &Column| {
+        column.setup.as_ref().and_then(|_| measured.next()).unwrap_or_else(|| {
+            let technique = column.kind.technique();
+            let result = RunResult::without_figures(technique, Status::Unavailable, "not in this build");
+            Measured { result, image: None, radiance: None }
+        })
     };
-    Ok((columns.iter().map(result).collect(), found.groups))
+    Ok((columns.iter().map(of_column).collect(), found.groups))
 }
 
 /// Why an experiment failed: a technique that broke off, or dropped what it found no room for.
@@ -242,11 +241,11 @@ struct Source {
 }
 
 impl Source {
-    /// What a report calls it.
+    /// What a report calls it: a file without its folder.
     fn title(&self) -> String {
         match self.paper.filter(|_| self.stands_in) {
             Some(paper) => format!("{} for {}", self.source, paper.name),
-            None => self.source.clone(),
+            None => self.source.rsplit('/').next().unwrap_or(&self.source).to_owned(),
         }
     }
 }
@@ -461,23 +460,38 @@ fn claims_text(claims: &[Claim]) -> String {
     claims.iter().filter(|claim| claim.ratio.is_some()).map(line).collect()
 }
 
+/// What the terminal shows last.
+fn verdict_text(claims: &[Claim], notes: &[String]) -> String {
+    let notes: String = notes.iter().map(|note| format!("note: {note}\n")).collect();
+    claims_text(claims) + &notes
+}
+
 /// The notes on a section and the claims on its scene, as sentences.
 fn section_note(notes: &[String], claims: &[Claim]) -> String {
     let claims = claims_text(claims);
     notes.iter().map(String::as_str).chain(claims.lines()).collect::<Vec<_>>().join(". ")
 }
 
+/// What opening a scene has to tell: a light that was put in, what of the settings it cannot give.
+fn session_notes(session: &Session, source: &Source, asked: &CommonArgs, common: &CommonArgs) -> Vec<String> {
+    let mut notes = session.renderer.warnings();
+    if common.lights != asked.lights {
+        notes.push(format!("{} has no light: a seeded one is put in", source.title()));
+    }
+    notes
+}
+
 /// What differs from the paper.
-fn notes(args: &BenchArgs, sources: &[Source], width_px: u32, paper_px: (u32, u32)) -> Vec<String> {
+fn notes(args: &BenchArgs, sources: &[Source], width_px: u32) -> Vec<String> {
     let mut notes = Vec::new();
     for source in sources.iter().filter(|source| source.stands_in) {
         let Some(paper) = source.paper else { continue };
         notes.push(format!("{} stands in for {} of the paper", source.source, paper.name));
     }
-    if width_px != paper_px.0 {
+    if width_px != PAPER_PX.0 {
         notes.push(format!(
             "{width_px} pixels wide instead of the paper's {}; its figures are shown as they are",
-            paper_px.0
+            PAPER_PX.0
         ));
     }
     if samples(args) != PAPER_SAMPLES {
@@ -488,11 +502,12 @@ fn notes(args: &BenchArgs, sources: &[Source], width_px: u32, paper_px: (u32, u3
 }
 
 /// Whether scene, size and samples are the paper's.
-fn as_in_paper(args: &BenchArgs, source: &Source, width_px: u32, paper_px: (u32, u32)) -> bool {
-    source.paper.is_some() && !source.stands_in && width_px == paper_px.0 && samples(args) == PAPER_SAMPLES
+fn as_in_paper(args: &BenchArgs, source: &Source, width_px: u32) -> bool {
+    source.paper.is_some() && !source.stands_in && width_px == PAPER_PX.0 && samples(args) == PAPER_SAMPLES
 }
 
-fn paper_record(section: &'static str, (width, height): (u32, u32)) -> PaperRecord {
+fn paper_record(section: &'static str) -> PaperRecord {
+    let (width, height) = PAPER_PX;
     PaperRecord { key: "schied-2015", section, device: PAPER_DEVICE, width, height }
 }
 
@@ -519,6 +534,7 @@ mod tests {
         let papers: Vec<_> = named.iter().map(|one| one.paper.map(|paper| paper.name)).collect();
         assert_eq!(papers, [Some("Sponza"), Some("San Miguel"), None]);
         assert!(named.iter().all(|one| !one.stands_in));
+        assert_eq!(named[0].title(), "Sponza.gltf");
         let stand_ins = sources(&["--scale", "0.5"]);
         assert_eq!(stand_ins[1].source, "builtin:colonnade?triangles=2036465");
         assert!(stand_ins.iter().all(|one| one.stands_in && one.paper.is_some()));
@@ -529,7 +545,7 @@ mod tests {
     fn only_the_papers_conditions_count_as_them() {
         let is_papers = |more: &[&str], width_px: u32| {
             let args = args(more);
-            as_in_paper(&args, &sources(&args, &PAPER_SCENES)[0], width_px, PAPER_PX)
+            as_in_paper(&args, &sources(&args, &PAPER_SCENES)[0], width_px)
         };
         assert!(is_papers(&["--scenes", "sponza.gltf"], 3840));
         assert!(!is_papers(&["--scenes", "sponza.gltf"], 1920));

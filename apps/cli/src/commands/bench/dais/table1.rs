@@ -3,23 +3,24 @@
 //!
 //! Times of two devices are not compared; ratios of techniques on one are.
 
-use afterlight_measure::{RunResult, SCHEMA, Spread, Status};
-use afterlight_report::{bytes_text, ms_text};
+use afterlight_measure::{RunResult, Spread, Status};
+use afterlight_report::{Picture, bytes_text, ms_text};
 use afterlight_techniques::Post;
 use serde::Serialize;
 
 use super::account::{Accounted, Bandwidth, account};
 use super::{
     Claim, Column, Kind, PAPER_PX, PAPER_SCENES, PaperRow, Sizes, Source, Times, as_in_paper, at_most,
-    broken_off, claims_text, columns, measure_columns, number_text, paper_record, reasons_text, samples,
-    section_note, sources, status_text, with_indirect,
+    broken_off, columns, measure_columns, number_text, paper_record, reasons_text, samples, section_note,
+    session_notes, sources, status_text, verdict_text, with_indirect,
 };
 use crate::args::{BenchArgs, CommonArgs};
-use crate::commands::bench::{
-    Experiment, Outcome, PaperRecord, Part, Row, at_size, labelled, run_of, to_json,
-};
+use crate::commands::bench::{Experiment, Header, Outcome, Part, Row, at_size, labelled, run_of, to_json};
+use crate::commands::compare;
 use crate::failure::Failure;
+use crate::frames::Measured;
 use crate::output;
+use crate::pictures;
 use crate::progress::Progress;
 use crate::session::Session;
 use crate::text;
@@ -59,11 +60,8 @@ struct Cell {
 /// What `bench dais-table1` writes as JSON.
 #[derive(Serialize)]
 struct Table1 {
-    schema: u32,
-    experiment: &'static str,
-    scale: f64,
-    paper: PaperRecord,
-    notes: Vec<String>,
+    #[serde(flatten)]
+    header: Header,
     bandwidth: Option<Bandwidth>,
     rows: Vec<Row<Cell>>,
     claims: Vec<Claim>,
@@ -73,56 +71,105 @@ fn run(args: &BenchArgs, progress: &Progress) -> Result<Outcome, Failure> {
     let common = with_indirect(at_size(args, PAPER_PX));
     let columns = columns(args, &Kind::ALL)?;
     let sources = sources(args, &PAPER_SCENES);
-    let mut notes = super::notes(args, &sources, common.width, PAPER_PX);
+    let mut notes = super::notes(args, &sources, common.width);
     let (mut rows, mut sections, mut claims, mut failed) = (Vec::new(), Vec::new(), Vec::new(), None);
     let mut bandwidth = None;
     for source in &sources {
-        let (session, _) = Session::open_along(&source.source, &common, args.path.as_deref(), progress)?;
-        notes.extend(session.renderer.warnings());
-        let (results, groups) =
-            measure_columns(&session.renderer, &columns, &session.workload, args.frames, progress)?;
-        if groups > 1 {
-            notes.push(format!("{}: frames took turns within {groups} groups", source.source));
-        }
-        if bandwidth.is_none() {
-            bandwidth = Bandwidth::measure(session.renderer.device(), most_bytes(&results))?;
-        }
-        session.finish(&common, common.quiet)?;
-        failed = failed.or_else(|| broken_off(&columns, &results));
-        let cells = cells(&columns, &results, source, bandwidth);
-        let first_claim = claims.len();
-        claims.extend(claims_of(source, &columns, &cells, as_in_paper(args, source, common.width, PAPER_PX)));
-        if !common.quiet {
-            output::tell(&args.json, &scene_text(&session, source, args, &common, &cells, bandwidth));
-        }
-        let run_with =
-            |results| run_of(&session, &common, (samples(args), Post::None), args.frames, "none", results);
-        let remarked =
-            results.iter().zip(&cells).map(|(result, cell)| labelled(result, cell.column, remark(cell)));
-        sections.push(Part {
-            heading: source.title(),
-            note: section_note(&notes, &claims[first_claim..]),
-            run: run_with(remarked.collect()),
-            charts: Vec::new(),
-            pictures: Vec::new(),
-        });
-        rows.push(Row { run: run_with(results), cells });
+        let found = of_scene(source, &columns, args, &common, &mut bandwidth, progress)?;
+        notes.extend(found.notes);
+        failed = failed.or(found.failed);
+        sections.push(Part { note: section_note(&notes, &found.claims), ..found.part });
+        claims.extend(found.claims);
+        rows.push(found.row);
     }
     if !common.quiet {
-        let told: String = notes.iter().map(|note| format!("note: {note}\n")).collect();
-        output::tell(&args.json, &format!("{}{told}", claims_text(&claims)));
+        output::tell(&args.json, &verdict_text(&claims, &notes));
     }
     let json = to_json(&Table1 {
-        schema: SCHEMA,
-        experiment: EXPERIMENT.name,
-        scale: args.scale,
-        paper: paper_record("Table 1", PAPER_PX),
-        notes,
+        header: Header::new(EXPERIMENT.name, args, paper_record("Table 1"), notes),
         bandwidth,
         rows,
         claims,
     })?;
     Ok(Outcome { title: "Deferred attribute interpolation shading", json, sections, failed })
+}
+
+/// What a scene gave.
+struct OfScene {
+    row: Row<Cell>,
+    part: Part,
+    claims: Vec<Claim>,
+    notes: Vec<String>,
+    failed: Option<String>,
+}
+
+/// Measures the columns in a scene; the bandwidth is measured in the first.
+fn of_scene(
+    source: &Source,
+    columns: &[Column],
+    args: &BenchArgs,
+    asked: &CommonArgs,
+    bandwidth: &mut Option<Bandwidth>,
+    progress: &Progress,
+) -> Result<OfScene, Failure> {
+    let mut common = asked.clone();
+    let (session, _) = Session::open_along(&source.source, &mut common, args.path.as_deref(), progress)?;
+    let mut notes = session_notes(&session, source, asked, &common);
+    let (mut measured, groups) =
+        measure_columns(&session.renderer, columns, &session.workload, args.frames, progress)?;
+    if groups > 1 {
+        notes.push(format!("{}: frames took turns within {groups} groups", source.source));
+    }
+    let pictures = compare_to_baseline(columns, &mut measured, args.report.is_some())?;
+    let results: Vec<RunResult> = measured.into_iter().map(|one| one.result).collect();
+    if bandwidth.is_none() {
+        *bandwidth = Bandwidth::measure(session.renderer.device(), most_bytes(&results))?;
+    }
+    session.finish(&common, common.quiet)?;
+
+    let failed = broken_off(columns, &results);
+    let cells = cells(columns, &results, source, *bandwidth);
+    let claims = claims_of(source, columns, &cells, as_in_paper(args, source, common.width));
+    if !common.quiet {
+        output::tell(&args.json, &scene_text(&session, source, args, &common, &cells, *bandwidth));
+    }
+    let reference = Kind::Deferred.technique();
+    let run_with =
+        |results| run_of(&session, &common, (samples(args), Post::None), args.frames, reference, results);
+    let remarked =
+        results.iter().zip(&cells).map(|(result, cell)| labelled(result, cell.column, remark(cell)));
+    let part = Part {
+        heading: source.title(),
+        note: String::new(),
+        run: run_with(remarked.collect()),
+        charts: Vec::new(),
+        pictures,
+    };
+    Ok(OfScene { row: Row { run: run_with(results), cells }, part, claims, notes, failed })
+}
+
+/// Compares images to the baseline's, and returns the pictures of a report, under the labels of columns.
+fn compare_to_baseline(
+    columns: &[Column],
+    measured: &mut [Measured],
+    with_pictures: bool,
+) -> Result<Vec<Picture>, Failure> {
+    let baseline = columns.iter().position(|column| column.kind == Kind::Deferred);
+    let Some(truth) = baseline.and_then(|index| measured[index].image.clone()) else {
+        return Ok(Vec::new());
+    };
+    let images: Vec<_> = measured.iter().map(|one| one.image.as_ref()).collect();
+    let differences = pictures::differences(&truth, &images)?;
+    let mut pictures = Vec::new();
+    for ((one, column), difference) in measured.iter_mut().zip(columns).zip(differences) {
+        one.result.difference = difference;
+        if with_pictures {
+            let picture = compare::picture(one, &truth)?;
+            pictures
+                .extend(picture.map(|picture| Picture { technique: column.label().to_owned(), ..picture }));
+        }
+    }
+    Ok(pictures)
 }
 
 fn most_bytes(results: &[RunResult]) -> u64 {
