@@ -84,12 +84,16 @@ const KNOWN: &[Known] = &[
     Known { stage: "gbuffer", reads: NOTHING, writes: Parts::All },
     Known { stage: "ids", reads: NOTHING, writes: Parts::All },
     Known { stage: "depth", reads: NOTHING, writes: Parts::All },
-    Known { stage: "fill", reads: Parts::Of(&["depth"]), writes: Parts::Of(&["references", "heads"]) },
+    Known {
+        stage: "fill",
+        reads: Parts::Of(&["depth"]),
+        writes: Parts::Of(&["references", "wide references", "heads"]),
+    },
     Known { stage: "mark", reads: Parts::Of(&["ids", "sample keys"]), writes: NOTHING },
     Known { stage: "derivatives", reads: NOTHING, writes: Parts::Of(&["triangle buffer"]) },
     Known {
         stage: "shade",
-        reads: Parts::Of(&["ids", "references", "heads", "sample keys"]),
+        reads: Parts::Of(&["ids", "references", "wide references", "heads", "sample keys"]),
         writes: Parts::Of(&["radiance"]),
     },
     Known { stage: "tonemap", reads: Parts::All, writes: Parts::All },

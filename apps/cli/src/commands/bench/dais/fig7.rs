@@ -49,7 +49,7 @@ pub(super) struct Tessellation {
 
 fn run(args: &BenchArgs, progress: &Progress) -> Result<Outcome, Failure> {
     let sizes = sizes(args);
-    let columns = columns(args, &[Kind::Deferred, Kind::Resolve, Kind::Cache])?;
+    let columns = columns(args, &[Kind::Deferred, Kind::Resolve, Kind::List])?;
     let sources = sources(args, &PAPER_SCENES[..1]);
     let mut notes = super::notes(args, &sources, sizes[1].width);
     notes.push("patches out of view or facing away make no triangles here; the paper culled none".to_owned());

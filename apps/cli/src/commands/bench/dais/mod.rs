@@ -119,37 +119,54 @@ const fn deferred_row(fill_ms: f64, shade_ms: f64, frame_ms: f64) -> PaperRow {
 enum Kind {
     /// The baseline.
     Deferred,
-    /// DAIS as it is by default here, which the paper does not have: the triangle buffer is filled in compute.
+    /// DAIS as it is by default here, which the paper does not have: the triangle buffer is filled in compute (tessellated surfaces
+    /// fill it as the paper's do).
     Resolve,
     /// The paper's DAIS.
     Cache,
     List,
+    /// As [`Kind::Resolve`], indirect light at half the rate.
     MultiRate,
+    /// The paper's multi-rate DAIS.
+    MultiRateCache,
 }
 
 impl Kind {
-    const ALL: [Kind; 5] = [Kind::Deferred, Kind::Resolve, Kind::Cache, Kind::List, Kind::MultiRate];
+    const ALL: [Kind; 6] =
+        [Kind::Deferred, Kind::Resolve, Kind::Cache, Kind::List, Kind::MultiRate, Kind::MultiRateCache];
 
     fn technique(self) -> &'static str {
         match self {
             Kind::Deferred => "deferred-dedup",
             Kind::Resolve | Kind::Cache => "dais",
             Kind::List => "dais-list",
-            Kind::MultiRate => "dais-multirate",
+            Kind::MultiRate | Kind::MultiRateCache => "dais-multirate",
         }
     }
 
     fn label(self) -> &'static str {
-        if self == Kind::Cache { "dais, fill=cache" } else { self.technique() }
+        match self {
+            Kind::Cache => "dais, fill=cache",
+            Kind::MultiRateCache => "dais-multirate, fill=cache",
+            _ => self.technique(),
+        }
     }
 
-    /// The paper's line; the default way of `dais` stands beside the paper's as well.
+    /// Parameters besides those of every column.
+    fn params(self) -> &'static [(&'static str, &'static str)] {
+        match self {
+            Kind::Cache | Kind::MultiRateCache => &[("fill", "cache")],
+            _ => &[],
+        }
+    }
+
+    /// The paper's line; the default way to fill stands beside the paper's as well.
     fn paper(self, scene: &PaperScene) -> PaperRow {
         match self {
             Kind::Deferred => scene.deferred,
             Kind::Resolve | Kind::Cache => scene.dais,
             Kind::List => scene.list,
-            Kind::MultiRate => scene.multirate,
+            Kind::MultiRate | Kind::MultiRateCache => scene.multirate,
         }
     }
 }
@@ -172,10 +189,7 @@ fn columns(args: &BenchArgs, kinds: &[Kind]) -> Result<Vec<Column>, Failure> {
     let samples = samples(args);
     let mut columns = Vec::new();
     for &kind in kinds {
-        let mut params = vec![("cull", "none")];
-        if kind == Kind::Cache {
-            params.push(("fill", "cache"));
-        }
+        let params = [&[("cull", "none")], kind.params()].concat();
         let setup = find(kind.technique())
             .map(|_| Setup::new(kind.label(), samples, kind.technique(), &params))
             .transpose()?;

@@ -220,7 +220,9 @@ fn claims_of(source: &Source, columns: &[Column], cells: &[Cell], as_in_paper: b
             Kind::Resolve | Kind::Cache => {
                 ("frame time", cell.frame_over_deferred, claimed.map(|c| c.dais_time))
             }
-            Kind::MultiRate => ("frame time", cell.frame_over_deferred, claimed.map(|c| c.multirate_time)),
+            Kind::MultiRate | Kind::MultiRateCache => {
+                ("frame time", cell.frame_over_deferred, claimed.map(|c| c.multirate_time))
+            }
         };
         Some(Claim {
             claim: format!("{what} over deferred shading's is at most the paper's"),
