@@ -33,6 +33,8 @@ fn ways(samples: u32) -> Vec<Way> {
         way(&[("visibility", "raster"), ("share", "quads")], RASTER, HALF_RATE_BOUND),
         way(&[("visibility", "compute"), ("share", "quads")], COMPUTE, HALF_RATE_BOUND),
         way(&[("fill", "cache"), ("share", "quads"), ("lights", "tiled")], CACHE, HALF_RATE_BOUND),
+        way(&[("fill", "cache"), ("share", "grid"), ("reference-bits", "8")], CACHE, HALF_RATE_BOUND),
+        way(&[("fill", "cache"), ("share", "quads"), ("reference-bits", "8")], CACHE, HALF_RATE_BOUND),
         way(&[("visibility", "raster"), ("rate", "1/4")], RASTER, QUARTER_RATE_BOUND),
         way(&[("visibility", "raster"), ("rate", "1/8")], RASTER, EIGHTH_RATE_BOUND),
     ];
