@@ -40,7 +40,7 @@ layout(set = 0, binding = 15, scalar) buffer NodeCount {
     uint samples_dropped;
 };
 // Samples of a pixel that found no node, 8 bits.
-layout(set = 0, binding = 17, scalar) buffer SampleDrops {
+layout(set = 0, binding = 26, scalar) buffer SampleDrops {
     uint sample_drops[];
 };
 layout(constant_id = 14) const uint NODE_CAPACITY = 0u;

@@ -11,7 +11,7 @@ use afterlight_graph::{Executor, Graph};
 use afterlight_measure::{Buffer, Pass, RunResult, Spread};
 use serde::Serialize;
 
-use super::{Phase, part, phase, share_needed};
+use super::{Phase, owner_and_stage, part, phase, share_needed};
 use crate::failure::Failure;
 
 /// Copies that a bandwidth is measured by.
@@ -87,7 +87,7 @@ const KNOWN: &[Known] = &[
     Known {
         stage: "fill",
         reads: Parts::Of(&["depth"]),
-        writes: Parts::Of(&["references", "wide references", "heads"]),
+        writes: Parts::Of(&["references", "wide references"]),
     },
     Known { stage: "mark", reads: Parts::Of(&["ids", "sample keys"]), writes: NOTHING },
     Known { stage: "derivatives", reads: NOTHING, writes: Parts::Of(&["triangle buffer"]) },
@@ -134,7 +134,7 @@ pub(super) fn account(result: &RunResult, bandwidth: Option<Bandwidth>) -> Vec<A
 
 /// Bytes that a pass reads and writes in full; `share` is the part of the triangle buffer that is used.
 fn known_bytes(pass: &Pass, share: f64) -> Option<u64> {
-    let stage = part(&pass.name);
+    let (_, stage) = owner_and_stage(&pass.name);
     let sum = |buffers: &[Buffer], parts: &Parts| {
         let counts = |buffer: &&Buffer| match parts {
             Parts::All => true,
@@ -194,7 +194,8 @@ mod tests {
             &[("dais-list/depth", 40)],
             &[("dais-list/heads", 4), ("dais-list/nodes", 99), ("dais-list/depth", 40)],
         );
-        assert_eq!(of(&fill), Some(44));
+        assert_eq!(of(&fill), Some(40));
+        assert_eq!(of(&Pass { name: "dais-list/fill 2".to_owned(), ..fill }), Some(40));
     }
 
     #[test]
@@ -219,6 +220,7 @@ mod tests {
         for (name, expected) in [
             ("shared/rsm", Phase::Indirect),
             ("dais/depth", Phase::Prepass),
+            ("dais-list/depth 2", Phase::Prepass),
             ("dais-list/fill", Phase::Fill),
             ("dais/large triangles", Phase::Fill),
             ("dais/clear keys", Phase::Fill),

@@ -319,8 +319,14 @@ enum Phase {
     Present,
 }
 
-fn phase(pass: &str) -> Phase {
+/// Whose a pass is, and its stage: bands of the image have passes of their own, told apart by a number.
+fn owner_and_stage(pass: &str) -> (&str, &str) {
     let (owner, stage) = pass.split_once('/').unwrap_or(("", pass));
+    (owner, stage.trim_end_matches(|c: char| c.is_ascii_digit() || c == ' '))
+}
+
+fn phase(pass: &str) -> Phase {
+    let (owner, stage) = owner_and_stage(pass);
     match (owner, stage) {
         ("shared", _) => Phase::Indirect,
         ("present" | "post", _) => Phase::Present,
