@@ -261,10 +261,10 @@ pub struct CommonArgs {
     /// Displaces tessellated surfaces by up to MM millimetres along each axis
     #[arg(long, value_name = "MM", requires = "tessellate", default_value_t = 0.0, value_parser = displacement_mm)]
     pub displacement: f32,
-    /// Shadows
+    /// Shadows of one light: the first directional or spot light, else the strongest point light
     #[arg(long, value_enum, default_value_t = Shadows::None)]
     pub shadows: Shadows,
-    /// Width and height of a light's view, texels [default: 512]
+    /// Width and height of a light's view, texels [default: 2048 for shadows, 512 for indirect light]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub shadow_map_size: Option<u32>,
     /// Indirect light
@@ -309,6 +309,17 @@ pub enum Shadows {
     Pcss,
 }
 
+impl Shadows {
+    /// What the techniques make of it; `None` where they have it not yet.
+    pub fn setting(self) -> Option<afterlight_techniques::Shadows> {
+        match self {
+            Shadows::None => Some(afterlight_techniques::Shadows::None),
+            Shadows::Map => Some(afterlight_techniques::Shadows::Map),
+            Shadows::Pcss => None,
+        }
+    }
+}
+
 /// `--indirect`
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Indirect {
@@ -339,13 +350,13 @@ impl CommonArgs {
             let expected = "none with a debug view (its colours are values, which no filter may mix)";
             return Err(Failure::option("--post", name_of(self.post), expected));
         }
-        if self.shadows != Shadows::None {
-            return not_yet("--shadows", &name_of(self.shadows), "none");
+        if self.shadows.setting().is_none() {
+            return not_yet("--shadows", &name_of(self.shadows), "none or map");
         }
         if let Some(size) = self.shadow_map_size
-            && self.indirect == Indirect::None
+            && (self.shadows, self.indirect) == (Shadows::None, Indirect::None)
         {
-            let expected = "no such option without --indirect rsm";
+            let expected = "no such option without --shadows map or --indirect rsm";
             return Err(Failure::option("--shadow-map-size", size, expected));
         }
         Ok(())
@@ -430,7 +441,7 @@ mod tests {
 
     #[test]
     fn what_is_not_there_yet_is_refused() {
-        for option in [["--shadows", "map"], ["--shadows", "pcss"], ["--shadow-map-size", "512"]] {
+        for option in [["--shadows", "pcss"], ["--shadow-map-size", "512"]] {
             let failure = compare(&option).common.check().expect_err("is refused");
             let line = failure.lines().remove(0);
             assert_eq!(failure.code(), 2);
@@ -441,7 +452,10 @@ mod tests {
         }
         let failure = compare(&["--post", "fxaa", "--view", "edges"]).common.check().expect_err("is refused");
         assert!(failure.lines()[0].starts_with("--post: found fxaa, expected none"));
-        assert!(compare(&["--indirect", "rsm", "--shadow-map-size", "256"]).common.check().is_ok());
+        for option in [["--indirect", "rsm"], ["--shadows", "map"]] {
+            let sized = [&option[..], &["--shadow-map-size", "256"]].concat();
+            assert!(compare(&sized).common.check().is_ok(), "{sized:?}");
+        }
         assert!(compare(&["--camera", "-1,0,0,0,0,0,60"]).common.check().is_ok());
     }
 }

@@ -9,9 +9,11 @@ use afterlight_measure::{DeviceRecord, SceneRecord, SettingsRecord};
 use afterlight_scene::camera::CameraPath;
 use afterlight_scene::{Camera, LightKind, LoadOptions, Projection, Scene, camera, lights, load_source};
 use afterlight_techniques::cost::Workload;
-use afterlight_techniques::{Indirect, Params, Post, Renderer, SceneGpu, Settings, Technique, registry};
+use afterlight_techniques::{
+    Indirect, Params, Post, Renderer, SceneGpu, Settings, Shadows, Technique, registry,
+};
 
-use crate::args::{self, CommonArgs};
+use crate::args::CommonArgs;
 use crate::failure::Failure;
 use crate::progress::Progress;
 
@@ -239,9 +241,11 @@ impl Session {
             displacement_m: common.displacement * 1e-3,
             view: common.view.clone(),
             indirect: common.indirect.into(),
+            shadows: common.shadows.setting().unwrap_or_default(),
             ..Settings::for_scene(&scene, common.width, common.height)
         };
         let settings = Settings {
+            rsm_size_px: common.shadow_map_size.unwrap_or(settings.rsm_size_px),
             shadow_map_size_px: common.shadow_map_size.unwrap_or(settings.shadow_map_size_px),
             ..settings
         };
@@ -284,6 +288,7 @@ impl Session {
 
     /// The settings as a run record keeps them.
     pub fn settings_record(&self, common: &CommonArgs, frames: u32, reference: &str) -> SettingsRecord {
+        let settings = self.renderer.settings();
         SettingsRecord {
             width: common.width,
             height: common.height,
@@ -294,9 +299,10 @@ impl Session {
             post: Post::from(common.post).name().to_owned(),
             tessellate_px: common.tessellate,
             displacement_mm: common.displacement,
-            indirect: Indirect::from(common.indirect).name().to_owned(),
-            shadow_map_size: (common.indirect != args::Indirect::None)
-                .then(|| self.renderer.settings().shadow_map_size_px),
+            indirect: settings.indirect.name().to_owned(),
+            rsm_size: (settings.indirect == Indirect::Rsm).then_some(settings.rsm_size_px),
+            shadows: settings.shadows.name().to_owned(),
+            shadow_map_size: (settings.shadows == Shadows::Map).then_some(settings.shadow_map_size_px),
             light_seed: (common.lights > 0).then_some(common.light_seed),
             version: env!("CARGO_PKG_VERSION").to_owned(),
         }

@@ -87,9 +87,9 @@ fn bad_usage_is_one_line_and_exit_code_2() {
         &["--displacement", "200", "from 0 to 100"],
     );
     refused(&["compare", "--displacement", "20"], 2, &["--tessellate"]);
-    refused(&["compare", "--shadows", "pcss"], 2, &["--shadows", "pcss"]);
+    refused(&["compare", "--shadows", "pcss"], 2, &["--shadows", "pcss", "none or map"]);
     refused(&["compare", "--indirect", "gi"], 2, &["--indirect", "gi", "rsm"]);
-    refused(&["compare", "--shadow-map-size", "256"], 2, &["--shadow-map-size", "256", "--indirect rsm"]);
+    refused(&["compare", "--shadow-map-size", "256"], 2, &["--shadow-map-size", "256", "--shadows map"]);
     refused(
         &["render", "builtin:edge", "--technique", "forward", "--view", "normals", "-o", "unused.png"],
         2,
@@ -219,9 +219,9 @@ fn render_writes_png_exr_and_figures() {
     assert_eq!(stats["results"][0]["technique"], "forward");
 }
 
-/// Indirect light is a pass of its own that no technique's memory counts, and the figures say that it was there.
+/// Lights' views are passes of their own that no technique's memory counts, and the figures say that they were there.
 #[test]
-fn indirect_light_is_recorded() {
+fn views_of_lights_are_recorded() {
     if !has_device() {
         return;
     }
@@ -240,13 +240,24 @@ fn indirect_light_is_recorded() {
         (&without["settings"]["indirect"], &with["settings"]["indirect"]),
         (&"none".into(), &"rsm".into())
     );
-    assert!(without["settings"]["shadow_map_size"].is_null());
-    assert_eq!(with["settings"]["shadow_map_size"], 64);
+    let shadowed = stats(&["--shadows", "map", "--shadow-map-size", "128"]);
+    assert_eq!(
+        (&without["settings"]["shadows"], &shadowed["settings"]["shadows"]),
+        (&"none".into(), &"map".into())
+    );
+    let sizes = |run: &Value| ["rsm_size", "shadow_map_size"].map(|size| run["settings"][size].as_u64());
+    assert_eq!(sizes(&without), [None, None]);
+    assert_eq!(sizes(&with), [Some(64), None]);
+    assert_eq!(sizes(&shadowed), [None, Some(128)]);
+    assert_eq!(sizes(&stats(&["--shadows", "map", "--indirect", "rsm"])), [Some(512), Some(2048)]);
     let memory = |run: &Value| run["results"][0]["memory"]["technique_bytes"].clone();
     assert_eq!(memory(&without), memory(&with));
+    assert_eq!(memory(&without), memory(&shadowed));
     let passes = |run: &Value| run["results"][0]["passes"].as_array().map_or(0, Vec::len);
     assert_eq!(passes(&without) + 1, passes(&with));
+    assert_eq!(passes(&without) + 1, passes(&shadowed));
     assert_eq!(with["results"][0]["passes"][0]["name"], "shared/rsm");
+    assert_eq!(shadowed["results"][0]["passes"][0]["name"], "shared/shadow");
 }
 
 #[test]

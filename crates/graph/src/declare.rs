@@ -345,6 +345,9 @@ pub struct RasterState {
     pub depth: DepthTest,
     /// Clamps depth to the viewport's range instead of clipping at the near and far planes.
     pub depth_clamp: bool,
+    /// Is added to depth for every unit of depth that the triangle falls or rises from one pixel to the next, along the axis
+    /// of the image where that is more; 0 adds nothing.
+    pub depth_bias_slope: f32,
     /// Stencil test; `None` is off.
     pub stencil: Option<StencilTest>,
     /// One entry a colour attachment, or empty: all replace.
@@ -369,6 +372,7 @@ impl RasterState {
             topology: vk::PrimitiveTopology::TRIANGLE_LIST,
             depth: DepthTest::OFF,
             depth_clamp: false,
+            depth_bias_slope: 0.0,
             stencil: None,
             blend: Vec::new(),
             cull: vk::CullModeFlags::NONE,

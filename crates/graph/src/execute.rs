@@ -135,6 +135,7 @@ struct DrawCommand {
     push: Vec<u8>,
     cull: vk::CullModeFlags,
     front_face: vk::FrontFace,
+    depth_bias_slope: f32,
     stencil_reference: u32,
     scissor: vk::Rect2D,
     vertex_buffers: Vec<gpu::Buffer>,
@@ -801,7 +802,7 @@ impl Builder<'_> {
             depth: (state.depth != DepthTest::OFF)
                 .then_some(gpu::DepthState { compare: state.depth.compare, write: state.depth.write }),
             depth_clamp: state.depth_clamp,
-            depth_bias: false,
+            depth_bias: is_biased(state),
             stencil: state.stencil.as_ref().map(stencil_state),
             blend: &blend,
             color_formats: &formats,
@@ -1127,6 +1128,7 @@ impl Builder<'_> {
             push: draw.push[..declared].to_vec(),
             cull: draw.state.cull,
             front_face: draw.state.front_face,
+            depth_bias_slope: draw.state.depth_bias_slope,
             stencil_reference: draw.stencil_reference,
             scissor: rect_2d(draw.scissor.unwrap_or(all), extent),
             vertex_buffers: draw.vertex_buffers.iter().map(|id| self.buffer(*id).clone()).collect(),
@@ -1147,7 +1149,12 @@ fn same_shader(a: &Shader, b: &Shader) -> bool {
     a.name == b.name && a.spirv.len() == b.spirv.len() && std::ptr::eq(a.spirv.as_ptr(), b.spirv.as_ptr())
 }
 
-/// Whether two states make the same pipeline; cull mode and front face are set with the draw.
+/// Whether a bias is added to depth.
+fn is_biased(state: &RasterState) -> bool {
+    state.depth_bias_slope != 0.0
+}
+
+/// Whether two states make the same pipeline; cull mode, front face and the depth bias are set with the draw.
 fn same_pipeline(a: &RasterState, b: &RasterState) -> bool {
     // A shader knows its stage, so that lists of one length that agree hold the same stages.
     let (of_a, of_b) = (a.shaders(), b.shaders());
@@ -1157,6 +1164,7 @@ fn same_pipeline(a: &RasterState, b: &RasterState) -> bool {
         && a.topology == b.topology
         && a.depth == b.depth
         && a.depth_clamp == b.depth_clamp
+        && is_biased(a) == is_biased(b)
         && a.stencil == b.stencil
         && a.blend == b.blend
         && a.layout == b.layout
@@ -1368,6 +1376,9 @@ impl DrawCommand {
         encoder.set_scissor(self.scissor);
         encoder.set_cull_mode(self.cull);
         encoder.set_front_face(self.front_face);
+        if self.depth_bias_slope != 0.0 {
+            encoder.set_depth_bias(0.0, 0.0, self.depth_bias_slope);
+        }
         encoder.set_stencil_reference(self.stencil_reference);
         encoder.push_constants(&self.push);
         if !self.vertex_buffers.is_empty() {

@@ -102,7 +102,13 @@ pub struct SettingsRecord {
     /// Indirect light: `none` or `rsm`.
     #[serde(default = "none")]
     pub indirect: String,
-    /// Width and height of a light's view, texels; none where there is none.
+    /// Width and height of the reflective shadow map, texels; none where there is none.
+    #[serde(default)]
+    pub rsm_size: Option<u32>,
+    /// Shadows: `none` or `map`.
+    #[serde(default = "none")]
+    pub shadows: String,
+    /// Width and height of the shadow map, texels; none where there is none.
     #[serde(default)]
     pub shadow_map_size: Option<u32>,
     /// Seed of the lights; none where the scene's own lights shade.
@@ -285,6 +291,8 @@ mod tests {
                 tessellate_px: None,
                 displacement_mm: 0.0,
                 indirect: "none".into(),
+                rsm_size: None,
+                shadows: "none".into(),
                 shadow_map_size: None,
                 light_seed: Some(1),
                 version: "0".into(),

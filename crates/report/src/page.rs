@@ -56,6 +56,7 @@ fn section(section: &Section<'_>) -> Markup {
                 (settings.samples) @if settings.samples == 1 { " sample" } @else { " samples" } " a pixel, "
                 @if settings.post != "none" { (settings.post) ", " }
                 @if let Some(px) = settings.tessellate_px { "tessellated to " (px) " pixels, " }
+                @if settings.shadows != "none" { "shadows by " (settings.shadows) ", " }
                 @if settings.indirect != "none" { "indirect light by " (settings.indirect) ", " }
                 "median of " (settings.frames) @if settings.frames == 1 { " frame" } @else { " frames" }
                 "; images compared to " code { (settings.reference) }

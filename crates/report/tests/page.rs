@@ -39,6 +39,8 @@ fn run() -> Run {
             tessellate_px: None,
             displacement_mm: 0.0,
             indirect: "none".into(),
+            rsm_size: None,
+            shadows: "none".to_owned(),
             shadow_map_size: None,
             light_seed: Some(1),
             version: "0.1.0".into(),

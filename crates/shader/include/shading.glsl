@@ -1,5 +1,6 @@
 // The illumination model, once for every technique: glTF 2.0's metal-rough BRDF (appendix B of its specification) under
-// point, spot and directional lights (KHR_lights_punctual), a constant ambient term, emission, indirect light.
+// point, spot and directional lights (KHR_lights_punctual), a constant ambient term, emission, indirect light, the shadows
+// of one light.
 //
 // CPU twin: crates/oracle/src/brdf.rs.
 #ifndef AFTERLIGHT_SHADING
@@ -7,6 +8,7 @@
 #include "frame.glsl"
 #include "material.glsl"
 #include "indirect.glsl"
+#include "shadow.glsl"
 
 // A light is four texels of an RGBA32UI image, 256 lights a row. An image and not a buffer, since a texel comes with one
 // vector load where lavapipe reads a buffer word by word and lane by lane.
@@ -79,7 +81,7 @@ vec3 reflectance(ShadingPoint p, vec3 l) {
     return ((1.0 - fresnel) * p.diffuse + fresnel * (distribution * visibility)) * n_dot_l;
 }
 
-// Radiance towards the eye that light number `index` causes; nothing beyond its range.
+// Radiance towards the eye that light number `index` causes; nothing beyond its range, nor in its shadow where it has one.
 vec3 light_radiance(ShadingPoint p, uint index) {
     vec4 place = light_texel(index, 0u);
     vec3 to_light = place.xyz - p.position_ws;
@@ -106,7 +108,11 @@ vec3 light_radiance(ShadingPoint p, uint index) {
             attenuation *= angular * angular;
         }
     }
-    return intensity * attenuation * reflectance(p, l);
+    vec3 radiance = intensity * attenuation * reflectance(p, l);
+    if (SHADOWS > 0u && index == shadow.light_index && radiance != vec3(0.0)) {
+        radiance *= lit_share(p.position_ws);
+    }
+    return radiance;
 }
 
 // Radiance of every light, in order.

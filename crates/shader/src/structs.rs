@@ -37,6 +37,16 @@ shader_struct! {
         pub samples: [[f32; 4]; 64],
     }
 
+    /// What a light reaches (`include/shadow.glsl`).
+    pub struct ShadowConstants {
+        /// World to texels of the shadow map and depth, homogeneous, columns.
+        pub texel_from_world: [[f32; 4]; 4],
+        /// Number of the light in the list.
+        pub light_index: u32,
+        /// Width and height of the map.
+        pub size_px: u32,
+    }
+
     /// One draw: at most 1,024 triangles of one instance; four texels, and the vertex stream of instances
     /// (`include/scene.glsl`).
     pub struct DrawData {
@@ -117,6 +127,7 @@ shader_struct! {
 pub const LAYOUTS: &[crate::StructLayout] = &[
     FrameConstants::LAYOUT,
     RsmConstants::LAYOUT,
+    ShadowConstants::LAYOUT,
     DrawData::LAYOUT,
     MaterialData::LAYOUT,
     LightData::LAYOUT,

@@ -8,7 +8,7 @@ use afterlight_shader::Shader;
 
 use crate::{
     SHADERS, capacity::Capacities, error::TechniqueError, indirect::Rsm, light_list::LightList,
-    params::Params, scene_gpu::SceneGpu,
+    params::Params, scene_gpu::SceneGpu, shadow::Shadow,
 };
 
 /// A frame to be recorded: the scene on the device, its buffers imported into the graph, sizes and parameters.
@@ -59,6 +59,8 @@ pub(crate) struct FrameBuffers {
     pub volume_indices: BufferHandle,
     /// What indirect light is gathered from; none while it is made.
     pub rsm: Option<Rsm>,
+    /// What a light reaches; none while it and what indirect light is gathered from are made.
+    pub shadow: Option<Shadow>,
 }
 
 /// What binds resources to the slots of a pass: raster or compute.
@@ -169,7 +171,7 @@ impl Frame<'_> {
     }
 
     /// Binds what every pass over the scene may read, by the names of `include/*.glsl`: frame constants, draws, materials,
-    /// lights, what indirect light is gathered from, vertices, textures. Slots that no shader of the pass has stay unused.
+    /// lights, what indirect light is gathered from, the shadow map, vertices, textures. Slots that no shader of the pass has stay unused.
     pub fn bind_scene(&self, pass: &mut impl Slots) {
         let b = &self.buffers;
         pass.read_buffer("FrameBlock", &b.frame);
@@ -187,6 +189,10 @@ impl Frame<'_> {
             pass.read_image("rsm_surface", rsm.images.as_ref().map_or(&b.materials, |i| &i.surface));
             pass.read_image("rsm_flux", rsm.images.as_ref().map_or(&b.light_spheres, |i| &i.flux));
         }
+        if let Some(shadow) = &b.shadow {
+            pass.read_buffer("ShadowBlock", &shadow.constants);
+            pass.read_image("shadow_map", shadow.map.as_ref().unwrap_or(&b.light_spheres));
+        }
         pass.textures(&self.scene.texture_set);
     }
 
@@ -198,6 +204,7 @@ impl Frame<'_> {
             .copied()
             .chain([
                 ("ONLY_POINT_LIGHTS", u32::from(self.lights.only_points)),
+                ("SHADOWS", u32::from(self.buffers.shadow.as_ref().is_some_and(|s| s.map.is_some()))),
                 ("INDIRECT_SAMPLES", self.buffers.rsm.as_ref().map_or(0, Rsm::sample_count)),
             ])
             .filter(|(name, _)| shaders.iter().any(|s| s.reflection.spec_constant(name).is_some()))

@@ -3,7 +3,7 @@
 //! A technique answers four questions (what a surface leaves behind, how lights find it, where shading runs, how samples
 //! become pixels) and is one folder: `mod.rs` with its `TECHNIQUE`, its shaders, `variants.txt` that lists their variants,
 //! a README. The build collects the folders into [`registry`]. Stages that several techniques share stand beside them:
-//! [`geometry`], [`gbuffer`], [`indirect`], [`volumes`], [`present`], [`post`].
+//! [`geometry`], [`gbuffer`], [`light_view`], [`indirect`], [`shadow`], [`volumes`], [`present`], [`post`].
 //!
 //! ```no_run
 //! use afterlight_techniques::{Params, Renderer, Settings, find, graph::gpu};
@@ -31,6 +31,7 @@ pub mod gbuffer;
 pub mod geometry;
 pub mod indirect;
 mod light_list;
+pub mod light_view;
 pub mod multisample;
 mod params;
 pub mod post;
@@ -38,6 +39,7 @@ pub mod present;
 mod radiance_target;
 mod renderer;
 mod scene_gpu;
+pub mod shadow;
 pub mod supersample;
 mod technique;
 mod textures;
@@ -55,6 +57,7 @@ pub use params::{ParamInfo, ParamKind, Params};
 pub use post::Post;
 pub use renderer::{Prepared, Renderer, Settings};
 pub use scene_gpu::SceneGpu;
+pub use shadow::Shadows;
 pub use technique::{
     ANY_SAMPLES, Answers, AppendixA, Exactness, Info, MULTIPLE_SAMPLES, Need, Source, Technique,
 };

@@ -61,6 +61,11 @@ impl LightList {
             lights,
         })
     }
+
+    /// Number of a light in the order of the device, the first of equals; 0 where it is not there.
+    pub(crate) fn index_of(&self, light: &Light) -> u32 {
+        self.lights.iter().position(|one| one == light).unwrap_or_default() as u32
+    }
 }
 
 fn is_unbounded(light: &Light) -> bool {

@@ -21,6 +21,7 @@ use crate::{
     params::Params,
     post::{self, Post},
     scene_gpu::{SceneGpu, upload_slice},
+    shadow::{self, Shadows},
     technique::Technique,
     view, volumes,
 };
@@ -58,8 +59,15 @@ pub struct Settings {
     pub displacement_m: f32,
     /// Light that surfaces reflect onto each other.
     pub indirect: Indirect,
-    /// Width and height of a light's view, texels, at least 1.
+    /// Width and height of the reflective shadow map, texels, at least 1.
+    pub rsm_size_px: u32,
+    /// Shadows of one light.
+    pub shadows: Shadows,
+    /// Width and height of the shadow map, texels, at least 1.
     pub shadow_map_size_px: u32,
+    /// Scale of the shadow map's bias: 1 is what its filter needs, less makes surfaces shadow themselves, more takes shadows
+    /// off what casts them.
+    pub shadow_bias: f32,
 }
 
 impl Settings {
@@ -79,7 +87,10 @@ impl Settings {
             tessellate_px: None,
             displacement_m: 0.0,
             indirect: Indirect::None,
-            shadow_map_size_px: indirect::DEFAULT_MAP_SIZE_PX,
+            rsm_size_px: indirect::DEFAULT_MAP_SIZE_PX,
+            shadows: Shadows::None,
+            shadow_map_size_px: shadow::DEFAULT_MAP_SIZE_PX,
+            shadow_bias: 1.0,
         }
     }
 }
@@ -158,7 +169,10 @@ impl Renderer {
 
     /// What of the settings this scene cannot give, a line each.
     pub fn warnings(&self) -> Vec<String> {
-        indirect::warning(&self.settings, &self.scene).into_iter().collect()
+        [indirect::warning, shadow::warning]
+            .into_iter()
+            .filter_map(|warning| warning(&self.settings, &self.scene))
+            .collect()
     }
 
     /// Records a technique, plans its graph, allocates memory and compiles pipelines.
@@ -315,6 +329,7 @@ impl Renderer {
             capacities,
         };
         indirect::record(&mut graph, &mut frame, settings)?;
+        shadow::record(&mut graph, &mut frame, settings)?;
         let hdr = technique.record(&mut graph, &frame)?;
         also(&mut graph, &hdr);
         let hdr_id = settings.keep_hdr.then(|| graph.keep(&hdr));
@@ -351,6 +366,7 @@ impl Renderer {
             volume: graph.import_buffer("light volume vertices", &self.volume),
             volume_indices: graph.import_buffer("light volume indices", &self.volume_indices),
             rsm: None,
+            shadow: None,
         }
     }
 }
@@ -360,6 +376,7 @@ fn check_size(device: &gpu::Device, settings: &Settings) -> Result<(), Technique
     for (what, found) in [
         ("image width in pixels", settings.width_px),
         ("image height in pixels", settings.height_px),
+        ("reflective shadow map size in pixels", settings.rsm_size_px),
         ("shadow map size in pixels", settings.shadow_map_size_px),
     ] {
         if u64::from(found) > limit || found == 0 {

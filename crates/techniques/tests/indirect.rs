@@ -9,7 +9,8 @@ use afterlight_oracle::{
 };
 use afterlight_techniques::{
     Exactness, Indirect, Params, Prepared, Renderer, Settings, find,
-    indirect::{RADIUS, SAMPLES, SourceView},
+    indirect::{RADIUS, SAMPLES},
+    light_view::SourceView,
     registry,
     scene::{Light, LightKind},
 };
@@ -70,13 +71,13 @@ fn errors(stage: &Stage, light: Light, patterns: &[Pattern]) -> Vec<f64> {
     let mut plain = stage.settings((size[0], size[1]), 0);
     plain.lights = vec![light];
     plain.environment.ambient_radiance = Vec3::ZERO;
-    plain.shadow_map_size_px = 64;
+    plain.rsm_size_px = 64;
     let forward = find("forward").unwrap();
     let without = stage.radiance(forward, &plain);
     let with = stage.radiance(forward, &with_rsm(plain.clone()));
     let rays = RayScene::new(&stage.scene);
     let source = SourceView::choose(&plain.lights, &stage.scene.bounds_ws()).expect("a light");
-    let map = Rsm::new(&rays, &source.light, &source.camera, plain.shadow_map_size_px);
+    let map = Rsm::new(&rays, &source.light, &source.camera, plain.rsm_size_px);
     let mut sums = vec![[0.0; 2]; patterns.len()];
     let mut lit = 0;
     for (i, (with, without)) in with.iter().zip(&without).enumerate() {
@@ -140,9 +141,9 @@ fn report_of_shared(prepared: &mut Prepared) -> Vec<String> {
 fn every_technique_has_the_same_indirect_light() {
     let gpu = afterlight_testkit::gpu();
     let stage = Stage::new(&gpu, "builtin:colonnade?triangles=30000");
-    let plain = Settings { shadow_map_size_px: 256, ..stage.settings((160, 90), 0) };
+    let plain = Settings { rsm_size_px: 256, ..stage.settings((160, 90), 0) };
     for camera in &stage.scene.cameras[..4] {
-        let large = Settings { shadow_map_size_px: 512, ..stage.from(camera.clone(), (480, 270), 0) };
+        let large = Settings { rsm_size_px: 512, ..stage.from(camera.clone(), (480, 270), 0) };
         show_indirect_light(&format!("indirect-{}", camera.name), &stage, &large);
     }
     for samples in [1, 4] {
@@ -182,7 +183,7 @@ fn the_lights_view_is_shared_memory() {
         let mut prepared = stage.prepare(find("deferred").unwrap(), settings);
         prepared.executor().plan().technique_bytes()
     };
-    let large = with_rsm(Settings { shadow_map_size_px: 1024, ..plain.clone() });
+    let large = with_rsm(Settings { rsm_size_px: 1024, ..plain.clone() });
     assert_eq!(bytes(&plain), bytes(&large));
 }
 
@@ -202,9 +203,9 @@ fn without_a_light_it_is_told() {
     let lit = with_rsm(stage.settings((64, 36), 0));
     assert!(warnings(&lit).is_empty());
     let mut prepared =
-        stage.try_prepare(forward, &Settings { shadow_map_size_px: u32::MAX, ..lit }, &Params::default());
+        stage.try_prepare(forward, &Settings { rsm_size_px: u32::MAX, ..lit }, &Params::default());
     let error = prepared.as_mut().err().map(|e| e.to_string()).expect("no device has that");
-    assert!(error.contains("shadow map size"), "{error}");
+    assert!(error.contains("reflective shadow map size"), "{error}");
 }
 
 /// Which light it is, and that its view holds what it lights.

@@ -64,6 +64,8 @@ pub struct Surfaces {
     pub masked: SurfaceShaders,
     /// Depth test.
     pub depth: DepthTest,
+    /// Bias of depth by slope, see [`RasterState::depth_bias_slope`].
+    pub depth_bias_slope: f32,
     /// Stencil test.
     pub stencil: Option<StencilTest>,
     /// Stencil test of masked surfaces where it is another; `None` is the same.
@@ -114,6 +116,7 @@ impl Surfaces {
             opaque: SurfaceShaders::new(frame, opaque.0, opaque.1)?,
             masked: SurfaceShaders::new(frame, masked.0, Some(masked.1))?,
             depth: DepthTest::NEAREST,
+            depth_bias_slope: 0.0,
             stencil: None,
             masked_stencil: None,
             stencil_reference: 0,
@@ -218,6 +221,7 @@ impl Surfaces {
         }
         state.constants.extend(self.constants.iter().cloned());
         state.depth = self.depth;
+        state.depth_bias_slope = self.depth_bias_slope;
         state.stencil = if bucket.masked() { self.masked_stencil.or(self.stencil) } else { self.stencil };
         state.blend = self.blend.clone();
         state.layout = vertex_layout();

@@ -1,0 +1,48 @@
+// Shadows of one light by a shadow map (Williams 1978), filtered by comparing before averaging (Reeves et al. 1987).
+//
+// CPU twin: crates/oracle/src/shadow.rs. Filled by crates/techniques/src/shadow.
+#ifndef AFTERLIGHT_SHADOW
+#define AFTERLIGHT_SHADOW
+#include "frame.glsl"
+
+// 0 where there are no shadows, so that all of this goes.
+layout(constant_id = 22) const uint SHADOWS = 0u;
+
+struct ShadowConstants {
+    mat4 texel_from_world;  // to texels of the map and depth, homogeneous; the depth of a point half a texel nearer to the light
+    uint light_index;       // the light that has shadows
+    uint size_px;           // of the map
+};
+
+layout(set = 0, binding = 24, scalar) uniform ShadowBlock {
+    ShadowConstants shadow;
+};
+
+// Depth of what the light sees, 1 near, 0 where it sees nothing.
+layout(set = 0, binding = 25) uniform texture2D shadow_map;
+
+// Share of the light that reaches a point: that of a square of two by two texels around its place in the map whose surfaces are
+// not nearer to the light. Each of the nine texels counts by its area in the square, so that the share is continuous. Lit where
+// the map does not reach.
+float lit_share(vec3 position_ws) {
+    vec4 p = shadow.texel_from_world * vec4(position_ws, 1.0);
+    vec2 place = p.xy / p.w;
+    bool seen = p.w > 0.0 && all(greaterThanEqual(place, vec2(1.0))) && all(lessThan(place, vec2(shadow.size_px - 1u)));
+    if (!seen) {
+        return 1.0;
+    }
+    float depth = p.z / p.w;
+    ivec2 texel = ivec2(place);
+    vec2 f = place - vec2(texel);
+    float sum = 0.0;
+    for (int y = -1; y <= 1; ++y) {
+        float height = y < 0 ? 1.0 - f.y : y > 0 ? f.y : 1.0;
+        for (int x = -1; x <= 1; ++x) {
+            float width = x < 0 ? 1.0 - f.x : x > 0 ? f.x : 1.0;
+            sum += depth >= texelFetch(shadow_map, texel + ivec2(x, y), 0).r ? width * height : 0.0;
+        }
+    }
+    return 0.25 * sum;
+}
+
+#endif

@@ -1,0 +1,173 @@
+//! A light's view of the scene: which light it is, and how a frame looks through it. What indirect light is gathered from
+//! (`indirect/`) and shadows (`shadow/`) are passes through it.
+
+use std::f32::consts::PI;
+
+use afterlight_graph::{
+    Graph,
+    gpu::{self, vk},
+};
+use afterlight_scene::{Aabb, Camera, Light, LightKind, Projection};
+use glam::{Mat4, Vec3};
+
+use crate::{
+    SceneGpu, Settings,
+    draw_list::{DrawList, DrawOptions},
+    error::TechniqueError,
+    frame::Frame,
+    renderer::View,
+};
+
+/// Widest angle of a light's perspective view, radians: further out a texel has hardly any solid angle.
+const WIDEST_RAD: f32 = 150.0 / 180.0 * PI;
+
+/// Angle of the view of a point light inside the scene, radians.
+const POINT_RAD: f32 = 120.0 / 180.0 * PI;
+
+/// The light that casts shadows and that indirect light comes from, and its view of the scene, as wide as high.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SourceView {
+    /// The light.
+    pub light: Light,
+    /// Its view.
+    pub camera: Camera,
+}
+
+impl SourceView {
+    /// The first directional or spot light; else the strongest point light, which looks towards the centre of the scene; `None`
+    /// without a light or a surface.
+    ///
+    /// A directional light's view holds the scene's bounds, a spot light's its cone up to 150°, a point light's the bounds' sphere
+    /// up to 120°.
+    pub fn choose(lights: &[Light], bounds_ws: &Aabb) -> Option<Self> {
+        let strength = |light: &Light| light.intensity.element_sum();
+        let light = *lights.iter().find(|l| l.kind != LightKind::Point).or_else(|| {
+            // The first of equals, whatever their order after it.
+            lights.iter().reduce(|a, b| if strength(b) > strength(a) { b } else { a })
+        })?;
+        if bounds_ws.is_empty() || !bounds_ws.size().is_finite() {
+            return None;
+        }
+        let camera = match light.kind {
+            LightKind::Directional => directional_view(&light, bounds_ws),
+            LightKind::Spot { outer_angle_rad, .. } => {
+                let target_ws = light.position_ws + light.direction_ws;
+                perspective_view(&light, target_ws, (2.0 * outer_angle_rad).min(WIDEST_RAD), bounds_ws)
+            }
+            LightKind::Point => {
+                let to_center = bounds_ws.center() - light.position_ws;
+                let sine = 0.5 * bounds_ws.size().length() / to_center.length();
+                let angle_rad = if sine < 1.0 { (2.0 * sine.asin()).min(POINT_RAD) } else { POINT_RAD };
+                perspective_view(&light, bounds_ws.center(), angle_rad, bounds_ws)
+            }
+        };
+        Some(Self { light, camera })
+    }
+
+    /// World to clip.
+    pub fn clip_from_world(&self) -> Mat4 {
+        self.camera.clip_from_view(1.0) * self.camera.view_from_world()
+    }
+
+    /// Half the height of the view's plane, m; under perspective of the plane at distance 1.
+    pub fn half_height(&self) -> f32 {
+        match self.camera.projection {
+            Projection::Perspective { fov_y_rad, .. } => (0.5 * fov_y_rad).tan(),
+            Projection::Orthographic { half_height_m, .. } => half_height_m,
+        }
+    }
+}
+
+/// Along the light, around all corners of the bounds.
+fn directional_view(light: &Light, bounds_ws: &Aabb) -> Camera {
+    let center_ws = bounds_ws.center();
+    let mut camera = Camera::look_at("light", center_ws, center_ws + light.direction_ws, 1.0, 0.1);
+    let axes = camera.world_from_view.matrix3;
+    let half_size = 0.5 * bounds_ws.size();
+    // Half the extent of a box along an axis, a little more so that what lies in its sides is not clipped.
+    let half_extent = |axis: glam::Vec3A| (Vec3::from(axis).abs().dot(half_size) * 1.01).max(1e-3);
+    let half_depth_m = half_extent(axes.z_axis);
+    camera.world_from_view.translation += axes.z_axis * half_depth_m;
+    camera.projection = Projection::Orthographic {
+        half_height_m: half_extent(axes.x_axis).max(half_extent(axes.y_axis)),
+        near_m: 0.0,
+        far_m: 2.0 * half_depth_m,
+    };
+    camera
+}
+
+fn perspective_view(light: &Light, target_ws: Vec3, angle_rad: f32, bounds_ws: &Aabb) -> Camera {
+    let near_m = (1e-4 * bounds_ws.size().length()).max(1e-4);
+    Camera::look_at("light", light.position_ws, target_ws, angle_rad.max(1e-3), near_m)
+}
+
+/// The light of a scene's settings, and its view; `None` without a light or a surface. Displaced surfaces are in view too.
+pub(crate) fn source(scene: &SceneGpu, settings: &Settings) -> Option<SourceView> {
+    let bounds = scene.draw_infos.iter().fold(Aabb::EMPTY, |bounds, draw| bounds.union(&draw.bounds_ws));
+    let displaced = Vec3::splat(settings.displacement_m);
+    SourceView::choose(
+        &settings.lights,
+        &Aabb { min: bounds.min - displaced, max: bounds.max + displaced },
+    )
+}
+
+/// Uploads constants of a shader.
+///
+/// # Errors
+/// The device.
+pub(crate) fn upload<T: bytemuck::NoUninit>(
+    device: &gpu::Device,
+    name: &str,
+    data: &T,
+) -> Result<gpu::Buffer, gpu::GpuError> {
+    let buffer = device.create_buffer(&gpu::BufferDesc {
+        name,
+        bytes: size_of::<T>() as u64,
+        usage: vk::BufferUsageFlags::UNIFORM_BUFFER,
+        memory: gpu::MemoryKind::Upload,
+    })?;
+    buffer.write(0, bytemuck::bytes_of(data))?;
+    Ok(buffer)
+}
+
+/// Lets the frame look through a light, `size_px` texels a side, while `declare` declares passes: constants, and draws culled
+/// by that view. Their buffers are named after `pass`.
+///
+/// # Errors
+/// Those of `declare`, the device.
+pub(crate) fn look_through<T>(
+    graph: &mut Graph,
+    frame: &mut Frame<'_>,
+    settings: &Settings,
+    source: &SourceView,
+    (pass, size_px): (&str, u32),
+    declare: impl FnOnce(&mut Graph, &Frame<'_>) -> Result<T, TechniqueError>,
+) -> Result<T, TechniqueError> {
+    let settings = Settings {
+        camera: source.camera.clone(),
+        width_px: size_px,
+        height_px: size_px,
+        ..settings.clone()
+    };
+    let view = View::new(&settings);
+    let mut draws = DrawList::new(frame.device, frame.scene, DrawOptions::default())?;
+    draws.update(frame.scene, view.clip_from_world, view.eye_ws, settings.displacement_m)?;
+    let name = format!("{pass} view");
+    let constants = upload(frame.device, &name, &view.constants(&settings, frame.lights))?;
+    let imported = [
+        graph.import_buffer(&name, &constants),
+        graph.import_buffer(&format!("{pass} draw commands"), &draws.commands),
+        graph.import_buffer(&format!("{pass} draw counts"), &draws.counts),
+    ];
+    let b = &mut frame.buffers;
+    let [constants, commands, counts] = imported;
+    let eye = [
+        std::mem::replace(&mut b.frame, constants),
+        std::mem::replace(&mut b.commands, commands),
+        std::mem::replace(&mut b.command_counts, counts),
+    ];
+    let declared = declare(graph, frame);
+    let b = &mut frame.buffers;
+    [b.frame, b.commands, b.command_counts] = eye;
+    declared
+}

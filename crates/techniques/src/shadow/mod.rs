@@ -1,0 +1,136 @@
+//! Shadows of one light, for every technique: a shadow map (Williams 1978).
+//!
+//! The light sees the scene once a frame, in `shared/shadow`; whatever shades asks its depths, in `light_radiance` of
+//! `include/shading.glsl`. See the README of this folder.
+
+use afterlight_graph::{BufferHandle, Graph, ImageHandle, ImageInfo, Load, gpu::vk};
+use afterlight_scene::Projection;
+use afterlight_shader::structs::ShadowConstants;
+use glam::{Mat4, Vec3};
+
+use crate::{
+    SceneGpu, Settings,
+    error::TechniqueError,
+    frame::Frame,
+    geometry::Surfaces,
+    light_view::{self, SourceView},
+};
+
+/// Width and height of the shadow map where none is given, texels.
+pub const DEFAULT_MAP_SIZE_PX: u32 = 2048;
+
+/// How far from a point the filter reads along each axis, at most, texels: it covers a texel to each side of the point, and the
+/// centre of a texel is half a texel from where it begins.
+pub const FILTER_REACH_TEXELS: f32 = 1.5;
+
+/// How much nearer to the light a point is taken to be, texels. Depths that slope cannot tell apart differ by rounding alone,
+/// which is far less.
+const NEARER_TEXELS: f32 = 0.5;
+
+/// Shadows of direct light.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Shadows {
+    /// None: light passes through surfaces.
+    #[default]
+    None,
+    /// Of one light, by a shadow map.
+    Map,
+}
+
+impl Shadows {
+    /// Name on the command line and in run records.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Shadows::None => "none",
+            Shadows::Map => "map",
+        }
+    }
+}
+
+/// What tells whether a light reaches a point, as the graph knows it.
+pub(crate) struct Shadow {
+    pub constants: BufferHandle,
+    /// None where there are no shadows.
+    pub map: Option<ImageHandle>,
+}
+
+/// Why there are no shadows though they were asked for.
+pub(crate) fn warning(settings: &Settings, scene: &SceneGpu) -> Option<String> {
+    (settings.shadows == Shadows::Map && light_view::source(scene, settings).is_none())
+        .then(|| "no shadows: the scene has no light, or no surface, to cast them".to_owned())
+}
+
+/// Declares `shared/shadow` where shadows are asked for and there is a light, and gives the frame what its passes bind.
+///
+/// # Errors
+/// A shader that is not compiled in, the device.
+pub(crate) fn record(
+    graph: &mut Graph,
+    frame: &mut Frame<'_>,
+    settings: &Settings,
+) -> Result<(), TechniqueError> {
+    let source = match settings.shadows {
+        Shadows::None => None,
+        Shadows::Map => light_view::source(frame.scene, settings),
+    };
+    let mut constants = ShadowConstants::default();
+    let map = match &source {
+        None => None,
+        Some(source) => {
+            let size_px = settings.shadow_map_size_px;
+            let nearer_texels = NEARER_TEXELS * settings.shadow_bias;
+            constants = ShadowConstants {
+                texel_from_world: texel_from_world(source, size_px, nearer_texels).to_cols_array_2d(),
+                light_index: frame.lights.index_of(&source.light),
+                size_px,
+            };
+            let pass = ("shared/shadow", size_px);
+            Some(light_view::look_through(graph, frame, settings, source, pass, |graph, frame| {
+                raster(graph, frame, size_px, settings.shadow_bias)
+            })?)
+        }
+    };
+    let buffer = light_view::upload(frame.device, "shared/shadow constants", &constants)?;
+    let constants = graph.import_buffer("shared/shadow constants", &buffer);
+    frame.buffers.shadow = Some(Shadow { constants, map });
+    Ok(())
+}
+
+/// World to texels of the map and the depth of a point that many texels nearer to the light, homogeneous.
+fn texel_from_world(source: &SourceView, size_px: u32, nearer_texels: f32) -> Mat4 {
+    let half_px = 0.5 * size_px as f32;
+    let texel_from_clip = Mat4::from_translation(Vec3::new(half_px, half_px, 0.0))
+        * Mat4::from_scale(Vec3::new(half_px, half_px, 1.0));
+    // Half a texel's width, m; under perspective at distance 1, and as a share of any distance.
+    let half_texel = source.half_height() / size_px as f32;
+    let nearer = 2.0 * half_texel * nearer_texels;
+    let bias = match source.camera.projection {
+        Projection::Orthographic { near_m, far_m, .. } => {
+            Mat4::from_translation(Vec3::Z * nearer / (far_m - near_m))
+        }
+        // Depth is near over distance.
+        Projection::Perspective { .. } => Mat4::from_scale(Vec3::new(1.0, 1.0, 1.0 + nearer)),
+    };
+    bias * texel_from_clip * source.clip_from_world()
+}
+
+/// Rasterises the scene as the light sees it, every surface pushed away from it by as much as it recedes within the filter's
+/// reach along both axes.
+fn raster(
+    graph: &mut Graph,
+    frame: &Frame<'_>,
+    size_px: u32,
+    bias: f32,
+) -> Result<ImageHandle, TechniqueError> {
+    let info = ImageInfo::new(vk::Format::D32_SFLOAT, size_px, size_px);
+    let map = graph.image("shared/shadow depth", info);
+    let mut surfaces = Surfaces::depth_only(frame)?;
+    // Less is farther.
+    surfaces.depth_bias_slope = -2.0 * FILTER_REACH_TEXELS * bias;
+    let mut pass = graph.raster("shared/shadow");
+    frame.bind_scene(&mut pass);
+    let map = pass.depth(map, Load::Clear(0.0));
+    surfaces.draw(frame, &mut pass);
+    pass.finish();
+    Ok(map)
+}
