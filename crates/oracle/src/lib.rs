@@ -8,6 +8,7 @@ pub mod furnace;
 pub mod packing;
 pub mod raster;
 pub mod rsm;
+pub mod shadow;
 pub mod texture;
 pub mod tiles;
 pub mod tonemap;

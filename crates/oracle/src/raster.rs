@@ -258,6 +258,17 @@ impl<'a> RayScene<'a> {
         out
     }
 
+    /// Unit normal of a hit's triangle in world space, to either side.
+    pub fn plane_normal_ws(&self, hit: &Hit) -> DVec3 {
+        let instance = &self.scene.instances[hit.instance as usize];
+        let world_from_object = widened(instance);
+        let [a, b, c] = corner_vertices(self.scene, instance, hit.triangle).map(|vertex| {
+            let p = self.scene.positions_os[vertex].map(f64::from);
+            world_from_object.transform_point3(DVec3::from_array(p))
+        });
+        (b - a).cross(c - a).normalize_or_zero()
+    }
+
     /// The surface of a hit: attributes, factors, textures made by code on their finest level (glTF 2.0, section 3.9).
     pub fn surface(&self, hit: &Hit) -> Surface {
         let m = self.material(hit.instance);

@@ -105,10 +105,7 @@ fn perspective_view(light: &Light, target_ws: Vec3, angle_rad: f32, bounds_ws: &
 pub(crate) fn source(scene: &SceneGpu, settings: &Settings) -> Option<SourceView> {
     let bounds = scene.draw_infos.iter().fold(Aabb::EMPTY, |bounds, draw| bounds.union(&draw.bounds_ws));
     let displaced = Vec3::splat(settings.displacement_m);
-    SourceView::choose(
-        &settings.lights,
-        &Aabb { min: bounds.min - displaced, max: bounds.max + displaced },
-    )
+    SourceView::choose(&settings.lights, &Aabb { min: bounds.min - displaced, max: bounds.max + displaced })
 }
 
 /// Uploads constants of a shader.
@@ -143,12 +140,8 @@ pub(crate) fn look_through<T>(
     (pass, size_px): (&str, u32),
     declare: impl FnOnce(&mut Graph, &Frame<'_>) -> Result<T, TechniqueError>,
 ) -> Result<T, TechniqueError> {
-    let settings = Settings {
-        camera: source.camera.clone(),
-        width_px: size_px,
-        height_px: size_px,
-        ..settings.clone()
-    };
+    let settings =
+        Settings { camera: source.camera.clone(), width_px: size_px, height_px: size_px, ..settings.clone() };
     let view = View::new(&settings);
     let mut draws = DrawList::new(frame.device, frame.scene, DrawOptions::default())?;
     draws.update(frame.scene, view.clip_from_world, view.eye_ws, settings.displacement_m)?;

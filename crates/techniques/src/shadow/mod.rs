@@ -134,3 +134,48 @@ fn raster(
     pass.finish();
     Ok(map)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use afterlight_scene::{Aabb, Light, LightKind};
+
+    fn sources() -> [SourceView; 2] {
+        let bounds = Aabb { min: Vec3::new(-3.0, 0.0, -2.0), max: Vec3::new(4.0, 5.0, 6.0) };
+        let light = |kind| Light {
+            kind,
+            position_ws: Vec3::new(7.0, 9.0, 4.0),
+            direction_ws: Vec3::new(-1.0, -1.1, -0.3).normalize(),
+            intensity: Vec3::ONE,
+            range_m: 50.0,
+        };
+        [LightKind::Directional, LightKind::Spot { inner_angle_rad: 0.3, outer_angle_rad: 0.6 }]
+            .map(|kind| SourceView::choose(&[light(kind)], &bounds).expect("a light"))
+    }
+
+    /// Place and depth of a point are those of a point that many texels, as wide as they are there, nearer to the light's plane.
+    #[test]
+    fn points_are_taken_nearer_by_shares_of_a_texel() {
+        let size_px = 256;
+        let point_ws = Vec3::new(0.5, 1.0, 2.0);
+        for source in sources() {
+            let view_from_world = source.camera.view_from_world();
+            let point_vs = view_from_world.transform_point3(point_ws);
+            // A step of the width of a texel along the view's axis, on the light's ray.
+            let texel_m = |scale: f32| 2.0 * source.half_height() * scale / size_px as f32;
+            let nearer_vs = point_vs
+                + match source.camera.projection {
+                    Projection::Orthographic { .. } => Vec3::Z * texel_m(1.0),
+                    Projection::Perspective { .. } => point_vs / point_vs.z * texel_m(-point_vs.z),
+                };
+            let nearer_ws = view_from_world.inverse().transform_point3(nearer_vs);
+            let expected = texel_from_world(&source, size_px, 0.0).project_point3(nearer_ws);
+            let found = texel_from_world(&source, size_px, 1.0).project_point3(point_ws);
+            assert!((found - expected).truncate().abs().max_element() < 0.01, "{found} for {expected}");
+            // Under perspective to the first order: a texel is 0.5% of the distance.
+            let here = texel_from_world(&source, size_px, 0.0).project_point3(point_ws);
+            let [found, expected] = [found, expected].map(|p| p.z - here.z);
+            assert!(found > 0.0 && (found / expected - 1.0).abs() < 0.01, "{found} for {expected}");
+        }
+    }
+}
