@@ -42,9 +42,11 @@ struct ShadingPoint {
     float alpha_sq;
     float n_dot_v;
     float v_term;       // sqrt of the view half of the Smith term
+    float lit;          // share that arrives of the light that has shadows
 };
 
-ShadingPoint shading_point(Surface s) {
+// Under lights without shadows.
+ShadingPoint unshadowed_point(Surface s) {
     ShadingPoint p;
     p.position_ws = s.position_ws;
     p.normal_ws = s.normal_ws;
@@ -56,6 +58,26 @@ ShadingPoint shading_point(Surface s) {
     p.alpha_sq = alpha * alpha;
     p.n_dot_v = max(dot(p.normal_ws, p.view_ws), 1e-4);
     p.v_term = sqrt(p.n_dot_v * p.n_dot_v * (1.0 - p.alpha_sq) + p.alpha_sq);
+    p.lit = 1.0;
+    return p;
+}
+
+// Under all lights. The shadow map is asked here and not in their loop: a device that runs both sides of a branch would ask it for
+// every light.
+ShadingPoint shading_point(Surface s) {
+    ShadingPoint p = unshadowed_point(s);
+    if (SHADOWS > 0u) {
+        p.lit = lit_share(p.position_ws);
+    }
+    return p;
+}
+
+// Under light number `index` alone.
+ShadingPoint shading_point_for(Surface s, uint index) {
+    ShadingPoint p = unshadowed_point(s);
+    if (SHADOWS > 0u && index == shadow.light_index) {
+        p.lit = lit_share(p.position_ws);
+    }
     return p;
 }
 
@@ -108,11 +130,10 @@ vec3 light_radiance(ShadingPoint p, uint index) {
             attenuation *= angular * angular;
         }
     }
-    vec3 radiance = intensity * attenuation * reflectance(p, l);
-    if (SHADOWS > 0u && index == shadow.light_index && radiance != vec3(0.0)) {
-        radiance *= lit_share(p.position_ws);
+    if (SHADOWS > 0u && index == shadow.light_index) {
+        attenuation *= p.lit;
     }
-    return radiance;
+    return intensity * attenuation * reflectance(p, l);
 }
 
 // Radiance of every light, in order.

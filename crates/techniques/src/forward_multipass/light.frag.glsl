@@ -19,6 +19,6 @@ void main() {
 #ifdef AMBIENT_PASS
     radiance_out = vec4(unlit_radiance(s), 1.0);
 #else
-    radiance_out = vec4(s.unlit ? vec3(0.0) : light_radiance(shading_point(s), light_index), 0.0);
+    radiance_out = vec4(s.unlit ? vec3(0.0) : light_radiance(shading_point_for(s, light_index), light_index), 0.0);
 #endif
 }

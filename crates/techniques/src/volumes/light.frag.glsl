@@ -12,6 +12,6 @@ void main() {
     Surface s;
     radiance_out = vec4(0.0);
     if (gbuffer_load(pixel, texelFetch(gbuffer_depth, pixel, 0).r, s)) {
-        radiance_out.rgb = light_radiance(shading_point(s), light_index);
+        radiance_out.rgb = light_radiance(shading_point_for(s, light_index), light_index);
     }
 }
