@@ -69,7 +69,7 @@ fn probes(stage: &Stage, settings: &Settings) -> Vec<Probe> {
     let rays = RayScene::new(&stage.scene);
     let source = SourceView::choose(&settings.lights, &stage.scene.bounds_ws()).expect("a light");
     let shadows = shadow::Shadows::new(&rays, &source.light);
-    let pixels = (0..SIZE[0] * SIZE[1]).filter(|i| (i % SIZE[0] + i / SIZE[0]) % 2 == 0);
+    let pixels = (0..SIZE[0] * SIZE[1]).filter(|i| (i % SIZE[0] + i / SIZE[0]).is_multiple_of(2));
     let probe = |i: u32| {
         let hit = rays.first_hit(&pixel_ray(&settings.camera, [i % SIZE[0], i / SIZE[0]], SIZE))?;
         let position_ws = rays.attributes(&hit).position_ws;
