@@ -13,7 +13,7 @@ use afterlight_techniques::{
     Indirect, Params, Post, Renderer, SceneGpu, Settings, Shadows, Technique, registry,
 };
 
-use crate::args::CommonArgs;
+use crate::args::{self, CommonArgs};
 use crate::failure::Failure;
 use crate::progress::Progress;
 
