@@ -18,6 +18,9 @@ pub(crate) const STEADY: u32 = 1;
 /// locks after 103,000 in the frame before (NVIDIA H200).
 pub(crate) const UNSTEADY: u32 = 8;
 
+/// Frames that are run to count what is [`UNSTEADY`]: the first after a pause needs least (25,000 triangles, then 57,688).
+const UNSTEADY_FRAMES: u32 = 4;
+
 /// What a frame counted of something that can overflow.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Counter {
@@ -31,6 +34,15 @@ pub struct Counter {
     pub dropped: u32,
     /// Whether the capacity was set by a parameter.
     pub fixed: bool,
+}
+
+/// The most of what frames counted; `before` may be empty.
+pub(crate) fn most(before: Vec<Counter>, last: Vec<Counter>) -> Vec<Counter> {
+    if before.is_empty() {
+        return last;
+    }
+    let more = |(a, b): (Counter, Counter)| if a.needed > b.needed { a } else { b };
+    before.into_iter().zip(last).map(more).collect()
 }
 
 /// A counter on the device: two words, what was asked for and what was dropped.
@@ -70,6 +82,12 @@ pub(crate) struct Capacities {
 impl Capacities {
     pub fn is_watched(&self) -> bool {
         !self.demands.borrow().is_empty()
+    }
+
+    /// Frames by which what a view needs is counted.
+    pub fn counting_frames(&self) -> u32 {
+        let unsteady = self.demands.borrow().iter().any(|demand| demand.slack_eighths == UNSTEADY);
+        if unsteady { UNSTEADY_FRAMES } else { 1 }
     }
 
     pub fn demands(&self) -> Vec<Demand> {
@@ -174,6 +192,13 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn the_frame_that_needs_most_counts() {
+        let frame = |needed| vec![counter(needed, 100, false), counter(7, 100, false)];
+        let all = [30, 90, 50].into_iter().fold(Vec::new(), |most_of, needed| most(most_of, frame(needed)));
+        assert_eq!(all, frame(90));
     }
 
     /// A resource for a demand that is not read.

@@ -11,7 +11,7 @@ use afterlight_shader::{Shader, structs::FrameConstants};
 use glam::{Mat4, Vec3, Vec4};
 
 use crate::{
-    capacity::{Capacities, Counter, Demand},
+    capacity::{self, Capacities, Counter, Demand},
     draw_list::{DrawList, DrawOptions, DrawOrder},
     error::TechniqueError,
     frame::{Frame, FrameBuffers},
@@ -224,8 +224,12 @@ impl Renderer {
                 return Ok(prepared);
             }
             // What the view needs is known after a frame of it.
-            prepared.run()?;
-            match capacities.next(&prepared.counters()?) {
+            let mut counters = Vec::new();
+            for _ in 0..capacities.counting_frames() {
+                prepared.run()?;
+                counters = capacity::most(counters, prepared.counters()?);
+            }
+            match capacities.next(&counters) {
                 Some(next) => capacities = next,
                 None => return Ok(prepared),
             }

@@ -48,11 +48,14 @@ void main() {
         uv0_uv1 = in_uv0_uv1[i];
         color = in_color[i];
 #ifdef WHOLE_TRIANGLE
-        vertex_normals = normals;
-        for (int k = 0; k < 3; ++k) {
-            vertex_position_ws[k] = in_position_ws[k];
-            vertex_uv0_uv1[k] = in_uv0_uv1[k];
-            vertex_color[k] = in_color[k];
+        // What is flat comes from the first vertex.
+        if (i == 0) {
+            vertex_normals = normals;
+            for (int k = 0; k < 3; ++k) {
+                vertex_position_ws[k] = in_position_ws[k];
+                vertex_uv0_uv1[k] = in_uv0_uv1[k];
+                vertex_color[k] = in_color[k];
+            }
         }
 #else
         position_ws = in_position_ws[i];

@@ -134,7 +134,9 @@ impl List {
         let ids = ids.written_by(&mut pass);
         pass.dispatch_indirect(&groups, 0);
         pass.finish();
-        frame.watch_with(graph, "triangles", &self.count, self.capacity, false, capacity::UNSTEADY);
+        // The triangles of tessellation are mostly small: hardly any is stored twice.
+        let slack = if frame.tessellate_px.is_some() { capacity::STEADY } else { capacity::UNSTEADY };
+        frame.watch_with(graph, "triangles", &self.count, self.capacity, false, slack);
         Ok(Records { words, ids, capacity: self.capacity })
     }
 }

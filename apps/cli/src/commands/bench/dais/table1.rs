@@ -378,7 +378,7 @@ fn account_text(cells: &[Cell], bandwidth: Option<Bandwidth>) -> String {
         }
     }
     format!(
-        "floor: what a pass touches in full at {:.1} GB/s, measured by a copy; scene data, textures and lists are not in it\n{table}\n",
+        "floor: what a pass touches in full at {:.1} GB/s, measured by fills and copies; scene data, textures and lists are not in it\n{table}\n",
         bandwidth.gb_per_s
     )
 }
