@@ -12,9 +12,9 @@ use afterlight_techniques::{
     indirect::{RADIUS, SAMPLES},
     light_view::SourceView,
     registry,
-    scene::{Light, LightKind},
+    scene::Light,
 };
-use common::{Stage, image_of, psnr};
+use common::{Stage, image_of, lights_of_each_kind, psnr};
 use glam::{DVec3, Vec3};
 
 /// Writes an image for the eye where `AFTERLIGHT_INDIRECT_IMAGES` names a folder.
@@ -48,20 +48,7 @@ fn with_rsm(settings: Settings) -> Settings {
 /// The light of each kind, above the scene's bounds and to the side.
 fn lights(stage: &Stage) -> [Light; 3] {
     let bounds = stage.scene.bounds_ws();
-    let position_ws = bounds.center() + bounds.size() * Vec3::new(0.5, 0.7, 0.6);
-    let light = |kind, intensity: f32| Light {
-        kind,
-        position_ws,
-        direction_ws: (bounds.center() - position_ws).normalize(),
-        intensity: Vec3::new(1.0, 0.9, 0.7) * intensity,
-        range_m: 10.0 * bounds.size().length(),
-    };
-    let far = bounds.size().length_squared();
-    [
-        Light { range_m: f32::INFINITY, ..light(LightKind::Directional, 30.0) },
-        light(LightKind::Spot { inner_angle_rad: 0.2, outer_angle_rad: 0.7 }, 30.0 * far),
-        light(LightKind::Point, 30.0 * far),
-    ]
+    lights_of_each_kind(stage, bounds.center() + bounds.size() * Vec3::new(0.5, 0.7, 0.6), 30.0)
 }
 
 /// What `forward` adds under `--indirect rsm` against rays and equation 1 in f64: the sum of absolute differences by the sum of

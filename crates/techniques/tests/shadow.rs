@@ -14,7 +14,7 @@ use afterlight_techniques::{
     scene::{Light, LightKind},
     shader::{Shader, compile::Compiler, manifest},
 };
-use common::{Stage, image_of, psnr};
+use common::{Stage, image_of, lights_of_each_kind, psnr};
 use glam::Vec3;
 
 /// Writes an image for the eye where `AFTERLIGHT_SHADOW_IMAGES` names a folder.
@@ -32,19 +32,7 @@ fn with_shadows(settings: Settings) -> Settings {
 fn lights(stage: &Stage) -> [Light; 3] {
     let bounds = stage.scene.bounds_ws();
     let position_ws = bounds.center() + bounds.size().length() * Vec3::new(0.7, 0.45, 0.15);
-    let light = |kind, intensity: f32| Light {
-        kind,
-        position_ws,
-        direction_ws: (bounds.center() - position_ws).normalize(),
-        intensity: Vec3::new(1.0, 0.9, 0.7) * intensity,
-        range_m: 10.0 * bounds.size().length(),
-    };
-    let far = bounds.size().length_squared();
-    [
-        Light { range_m: f32::INFINITY, ..light(LightKind::Directional, 3.0) },
-        light(LightKind::Spot { inner_angle_rad: 0.2, outer_angle_rad: 0.7 }, 3.0 * far),
-        light(LightKind::Point, 3.0 * far),
-    ]
+    lights_of_each_kind(stage, position_ws, 3.0)
 }
 
 const SIZE: [u32; 2] = [160, 90];

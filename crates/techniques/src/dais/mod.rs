@@ -88,6 +88,17 @@ impl Cache {
     }
 }
 
+/// The row of the visibility buffer, which is nearest.
+pub(crate) const APPENDIX_A: AppendixA = AppendixA {
+    id: "D++",
+    intersect: "dec",
+    transparency: "n",
+    hardware_msaa: "y",
+    light_access: "seq",
+    material_access: "seq",
+    rates_decoupled: "y, n",
+};
+
 static INFO: Info = Info {
     id: "dais",
     title: "Deferred attribute interpolation shading",
@@ -103,15 +114,7 @@ static INFO: Info = Info {
         schedule: "compute, a thread a pixel",
         resolve: "once a triangle",
     },
-    appendix_a: AppendixA {
-        id: "D++",
-        intersect: "dec",
-        transparency: "n",
-        hardware_msaa: "y",
-        light_access: "seq",
-        material_access: "seq",
-        rates_decoupled: "y, n",
-    },
+    appendix_a: APPENDIX_A,
     // Texture gradients are analytic.
     exactness: Exactness::Exact { min_psnr_db: 45.0 },
     params: &[

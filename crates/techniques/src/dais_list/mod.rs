@@ -5,8 +5,8 @@
 use afterlight_graph::{BufferHandle, ComputePass, Graph, ImageHandle, ImageInfo, Load, RasterPass};
 
 use crate::{
-    Answers, AppendixA, Exactness, Frame, Info, MULTIPLE_SAMPLES, Need, ParamInfo, ParamKind, Params, Source,
-    Technique, TechniqueError,
+    Answers, Exactness, Frame, Info, MULTIPLE_SAMPLES, Need, ParamInfo, ParamKind, Params, Source, Technique,
+    TechniqueError,
     cost::{self, Cost, Workload},
     dais::{self, Cache, ScenePasses},
     dais_multirate::{FULL_RATE, LowRate, SHARE},
@@ -58,15 +58,7 @@ static INFO: Info = Info {
         schedule: "compute, a thread a pixel",
         resolve: "once a triangle, weighted by coverage",
     },
-    appendix_a: AppendixA {
-        id: "D++",
-        intersect: "dec",
-        transparency: "n",
-        hardware_msaa: "y",
-        light_access: "seq",
-        material_access: "seq",
-        rates_decoupled: "y, n",
-    },
+    appendix_a: dais::APPENDIX_A,
     exactness: Exactness::Exact { min_psnr_db: 45.0 },
     params: &[multisample::LIGHTS, NODES, BANDS, dais::CACHE_BUCKETS, FULL_RATE, SHARE],
     needs: &[Need { name: "post-depth coverage", test: |features| features.post_depth_coverage }],

@@ -5,8 +5,8 @@
 use afterlight_graph::{ComputePass, Graph, ImageHandle};
 
 use crate::{
-    Answers, AppendixA, Exactness, Frame, Info, ParamInfo, ParamKind, Params, Source, Technique,
-    TechniqueError, compute_raster,
+    Answers, Exactness, Frame, Info, ParamInfo, ParamKind, Params, Source, Technique, TechniqueError,
+    compute_raster,
     cost::{self, Cost, Workload},
     dais,
     graph::gpu,
@@ -128,15 +128,7 @@ static INFO: Info = Info {
         schedule: "compute, a thread a pixel; indirect light a few threads a triangle and cell of pixels",
         resolve: "once a triangle",
     },
-    appendix_a: AppendixA {
-        id: "D++",
-        intersect: "dec",
-        transparency: "n",
-        hardware_msaa: "y",
-        light_access: "seq",
-        material_access: "seq",
-        rates_decoupled: "y, n",
-    },
+    appendix_a: dais::APPENDIX_A,
     exactness: Exactness::Approximate {
         bound: "indirect light of a cell's pixels is that of their mean place; without --indirect as dais",
         min_psnr_db: 40.0,

@@ -35,7 +35,7 @@ impl RecordSource<'_> {
     /// Declares the frame's view, one of those that [`super::is_of_triangles`] names. Returns its image.
     ///
     /// # Errors
-    /// Those of [`Self::sharing`] and [`Self::attribute_error`].
+    /// A view of errors in a tessellated frame, whose triangles have no ID; a shader that is not compiled in.
     pub fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         match super::compares_triangles(frame.view) {
             true => self.attribute_error(graph, frame),

@@ -10,9 +10,10 @@ use afterlight_image::{Rgba8Image, psnr_db};
 use afterlight_techniques::{
     Params, Prepared, Renderer, SceneGpu, Settings, Technique, TechniqueError,
     graph::gpu,
-    scene::{self, Camera, Light, Scene, lights::seeded_lights},
+    scene::{self, Camera, Light, LightKind, Scene, lights::seeded_lights},
     shader::{Shader, compile::Compiler, manifest},
 };
+use glam::Vec3;
 
 /// A scene on the device.
 pub struct Stage {
@@ -83,6 +84,24 @@ impl Stage {
         let rgba = prepared.hdr_rgba().unwrap_or_else(|e| panic!("{e}")).expect("kept");
         rgba.chunks_exact(4).map(|c| [c[0], c[1], c[2], c[3]]).collect()
     }
+}
+
+/// A directional, a spot and a point light at a place, towards the scene's centre; about as bright there.
+pub fn lights_of_each_kind(stage: &Stage, position_ws: Vec3, intensity: f32) -> [Light; 3] {
+    let bounds = stage.scene.bounds_ws();
+    let light = |kind, intensity: f32| Light {
+        kind,
+        position_ws,
+        direction_ws: (bounds.center() - position_ws).normalize(),
+        intensity: Vec3::new(1.0, 0.9, 0.7) * intensity,
+        range_m: 10.0 * bounds.size().length(),
+    };
+    let far = intensity * bounds.size().length_squared();
+    [
+        Light { range_m: f32::INFINITY, ..light(LightKind::Directional, intensity) },
+        light(LightKind::Spot { inner_angle_rad: 0.2, outer_angle_rad: 0.7 }, far),
+        light(LightKind::Point, far),
+    ]
 }
 
 /// Runs a frame and reads its image.
