@@ -134,7 +134,7 @@ pub struct CompareArgs {
 }
 
 /// Arguments of `bench`.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 pub struct BenchArgs {
     /// Which options were given: experiments have sizes of their own.
     #[command(flatten)]

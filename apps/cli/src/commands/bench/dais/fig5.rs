@@ -4,7 +4,7 @@
 use super::flight::{Flight, Gathered, claim, fly, open, ratios};
 use super::{
     Claim, Column, Kind, PAPER_SCENES, Source, as_in_paper, at_most, columns, session_notes, sizes, sources,
-    with_indirect,
+    with_indirect, with_samples,
 };
 use crate::args::BenchArgs;
 use crate::commands::bench::{Experiment, Outcome};
@@ -26,6 +26,7 @@ const GROWTH_MAX: f64 = 1.45;
 const DEFERRED_GROWTH: f64 = 2.0;
 
 fn run(args: &BenchArgs, progress: &Progress) -> Result<Outcome, Failure> {
+    let args = &with_samples(args)?;
     let asked = sizes(args).map(with_indirect);
     let columns = columns(args, &Kind::ALL)?;
     let sources = sources(args, &PAPER_SCENES);

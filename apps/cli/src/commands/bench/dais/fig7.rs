@@ -8,7 +8,9 @@ use afterlight_techniques::geometry::{MAX_TESSELLATE_PX, MIN_TESSELLATE_PX};
 use serde::Serialize;
 
 use super::flight::{Flight, Gathered, ViewCell, claim, fly, open, places, ratios, triangles_drawn};
-use super::{Claim, Column, Kind, PAPER_PX, PAPER_SCENES, Source, as_in_paper, columns, sizes, sources};
+use super::{
+    Claim, Column, Kind, PAPER_PX, PAPER_SCENES, Source, as_in_paper, columns, sizes, sources, with_samples,
+};
 use crate::args::{BenchArgs, CommonArgs};
 use crate::commands::bench::{Experiment, FULL_HD_PX, Outcome};
 use crate::failure::Failure;
@@ -48,6 +50,7 @@ pub(super) struct Tessellation {
 }
 
 fn run(args: &BenchArgs, progress: &Progress) -> Result<Outcome, Failure> {
+    let args = &with_samples(args)?;
     let sizes = sizes(args);
     let columns = columns(args, &[Kind::Deferred, Kind::Resolve, Kind::List])?;
     let sources = sources(args, &PAPER_SCENES[..1]);

@@ -207,6 +207,18 @@ fn columns(args: &BenchArgs, kinds: &[Kind]) -> Result<Vec<Column>, Failure> {
     Ok(columns)
 }
 
+/// The same options with samples a pixel: those that are asked for, else the paper's, or the most that the device has below.
+fn with_samples(args: &BenchArgs) -> Result<BenchArgs, Failure> {
+    let mut args = args.clone();
+    if !args.given.samples {
+        let device = session::open_device(&args.common)?;
+        let counts = [PAPER_SAMPLES, PAPER_SAMPLES / 2, PAPER_SAMPLES / 4];
+        let there = counts.into_iter().find(|count| device.features().supports_samples(*count, false));
+        (args.common.samples, args.given.samples) = (there.unwrap_or(PAPER_SAMPLES), true);
+    }
+    Ok(args)
+}
+
 fn samples(args: &BenchArgs) -> u32 {
     if args.given.samples { args.common.samples } else { PAPER_SAMPLES }
 }

@@ -12,7 +12,7 @@ use super::account::{Accounted, Bandwidth, account};
 use super::{
     Claim, Column, Kind, PAPER_PX, PAPER_SCENES, PaperRow, Sizes, Source, Times, as_in_paper, at_most,
     broken_off, columns, measure_columns, number_text, paper_record, reasons_text, samples, section_note,
-    session_notes, sources, status_text, verdict_text, with_indirect,
+    session_notes, sources, status_text, verdict_text, with_indirect, with_samples,
 };
 use crate::args::{BenchArgs, CommonArgs};
 use crate::commands::bench::{Experiment, Header, Outcome, Part, Row, at_size, labelled, run_of, to_json};
@@ -68,6 +68,7 @@ struct Table1 {
 }
 
 fn run(args: &BenchArgs, progress: &Progress) -> Result<Outcome, Failure> {
+    let args = &with_samples(args)?;
     let common = with_indirect(at_size(args, PAPER_PX));
     let columns = columns(args, &Kind::ALL)?;
     let sources = sources(args, &PAPER_SCENES);
