@@ -4,6 +4,7 @@
 //! twin of. Inputs come as the scene holds them, 32-bit, and are widened first.
 
 pub mod brdf;
+pub mod clusters;
 pub mod furnace;
 pub mod packing;
 pub mod raster;

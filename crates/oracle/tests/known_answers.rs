@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 
 use afterlight_oracle::{
     brdf::{self, Surface},
+    clusters::{ClusterView, slice_begins_m},
     furnace, packing,
     raster::{RayScene, pixel_ray},
     tiles::{TileView, light_reaches},
@@ -312,4 +313,67 @@ fn tiles_take_their_bounds_from_their_pixels() {
         assert!(plane.dot(ray.origin_ws.extend(1.0)).abs() < 1e-4);
         assert!(plane.dot((ray.origin_ws + 3.0 * ray.direction_ws).extend(1.0)) > 0.0);
     }
+}
+
+/// Pairs of a point in a random cluster and a light that reaches it: all, and those whose light is not on the cluster's list,
+/// `taken` being the slice that is asked instead of the point's and `lights` those that lists are made of. Third: lights on the
+/// lists.
+fn listed(logarithmic: bool, taken: u32, range_scale: f32) -> [u32; 3] {
+    let (camera, lights) = tiled_hall();
+    let lights = &lights[..40];
+    let tested: Vec<_> = lights.iter().map(|l| Light { range_m: range_scale * l.range_m, ..*l }).collect();
+    let size_px = [701, 393];
+    let (range_m, slices) = ([0.4, 30.0], 24);
+    let view = ClusterView::new(&camera, size_px, 32, slice_begins_m(range_m, slices, logarithmic));
+    let forward = camera.world_from_view.matrix3.z_axis.as_dvec3() * -1.0;
+    let (mut state, mut found) = (1u64, [0; 3]);
+    let mut random = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 40) as f64 / (1u64 << 24) as f64
+    };
+    for _ in 0..100_000 {
+        let pixel = size_px.map(|size| (random() * f64::from(size)) as u32);
+        let distance_m = range_m[0] * (range_m[1] / range_m[0]).powf(random());
+        let ray = pixel_ray(&camera, pixel, size_px);
+        let point_ws = ray.origin_ws + ray.direction_ws * (distance_m / ray.direction_ws.dot(forward));
+        let cluster = view.cluster(pixel, distance_m);
+        let asked = cluster - cluster % slices + (cluster % slices + taken) % slices;
+        for (light, decision) in lights.iter().zip(view.cull(asked, &tested)) {
+            let reached = light_reaches(light, point_ws);
+            found[0] += u32::from(reached);
+            found[1] += u32::from(reached && !decision.passes);
+            found[2] += u32::from(decision.passes);
+        }
+    }
+    found
+}
+
+#[test]
+fn clusters_never_miss_a_light() {
+    for logarithmic in [true, false] {
+        let [reached, missed, listed] = listed(logarithmic, 0, 1.0);
+        let excess = f64::from(listed) / f64::from(reached);
+        println!("logarithmic {logarithmic}: {listed} listed, {reached} reached: {excess:.2}");
+        assert_eq!(missed, 0);
+        // not a test that lets all pass
+        assert!(reached > 20_000 && excess < 3.0, "{listed} listed, {reached} reached");
+    }
+}
+
+/// The mutants of the test above.
+#[test]
+fn clusters_of_the_next_slice_or_with_smaller_ranges_are_seen() {
+    assert!(listed(true, 1, 1.0)[1] > 0, "the next slice's lists go unseen");
+    assert!(listed(true, 0, 0.98)[1] > 0, "ranges smaller by two percent go unseen");
+}
+
+#[test]
+fn slices_are_equal_steps_or_equal_ratios() {
+    assert_eq!(slice_begins_m([2.0, 10.0], 4, false), [2.0, 4.0, 6.0, 8.0, 10.0]);
+    for (found, expected) in slice_begins_m([1.0, 16.0], 4, true).iter().zip([1.0, 2.0, 4.0, 8.0, 16.0]) {
+        assert!((found - expected).abs() < 1e-12, "{found}, expected {expected}");
+    }
+    // what is nearer than all ratios lies in the first slice
+    assert_eq!(slice_begins_m([0.0, 1.0], 1, true), [0.0, 1.0]);
+    assert!((slice_begins_m([0.0, 1.0], 4, true)[1] - 1e-3).abs() < 1e-12);
 }

@@ -11,7 +11,7 @@
 #define AFTERLIGHT_TILES
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
-#include "frame.glsl"
+#include "culling.glsl"
 
 layout(local_size_x = 16, local_size_y = 16) in;
 
@@ -20,27 +20,9 @@ const uint TILE_THREADS = TILE_SIZE * TILE_SIZE;
 const uint BATCH_LIGHTS = 1024u;
 const uint BATCH_WORDS = BATCH_LIGHTS / 32u;
 
-// Centre and range of every light, one texel of RGBA32F each, 1,024 a row: what culling reads, a quarter of a light.
-// Range infinite: never culled.
-layout(set = 0, binding = 5) uniform texture2D light_spheres;
-
-vec4 light_sphere(uint index) {
-    return texelFetch(light_spheres, ivec2(index & 1023u, index >> 10), 0);
-}
-
 shared uint tile_nearest;   // bits of non-negative floats order as unsigned integers
 shared uint tile_farthest;
 shared uint tile_lights[BATCH_WORDS];
-
-// World-space half-space dot(n, p) + d >= 0 from a row combination of clip_from_world.
-vec4 unit_plane(vec4 plane) {
-    return plane / length(plane.xyz);
-}
-
-vec4 clip_row(int i) {
-    mat4 m = frame.clip_from_world;
-    return vec4(m[0][i], m[1][i], m[2][i], m[3][i]);
-}
 
 // Reduces the ranges of view distances of a tile's pixels. Every thread of the group calls it once; `covered` is false
 // where the pixel shows no surface. False where no pixel of the tile does.

@@ -259,6 +259,53 @@ pub fn tiled_deferred(w: &Workload) -> Cost {
     }
 }
 
+/// TF, section 4.8.
+pub fn tiled_forward(w: &Workload) -> Cost {
+    let shared = w.light_fragments / w.pixels_a_tile;
+    Cost {
+        cmd: 2.0 * w.objects * w.object_command + w.lights * w.light_command,
+        proc: 2.0 * w.vertices() + w.light_volumes() + w.light_fragments * w.evaluation,
+        mem: 2.0 * w.pixels + w.light_list_floats,
+        band: (w.vertex_traffic() + 2.0 * w.object_fragments)
+            + (w.volume_traffic() + shared)
+            + (w.vertex_traffic()
+                + w.pixels * w.object_fragment_traffic
+                + w.light_fragment_traffic * shared
+                + 2.0 * w.pixels),
+    }
+}
+
+/// CD, section 4.10; `pixels_a_cluster`: c in lf/c.
+pub fn clustered_deferred(w: &Workload, pixels_a_cluster: f64) -> Cost {
+    let shading = w.light_fragments * (1.0 - w.light_culling);
+    let shared = shading / pixels_a_cluster;
+    Cost {
+        cmd: w.objects * w.object_command + w.lights * w.light_command,
+        proc: w.vertices() + w.light_volumes() + shading * w.evaluation,
+        mem: 3.0 * w.pixels + w.light_list_floats,
+        band: (w.vertex_traffic() + w.object_fragments * (w.object_fragment_traffic + 3.0))
+            + (w.volume_traffic() + shared)
+            + (w.light_fragment_traffic * shared + 4.0 * w.pixels),
+    }
+}
+
+/// CF, section 4.10; `pixels_a_cluster`: c in lf/c.
+pub fn clustered_forward(w: &Workload, pixels_a_cluster: f64) -> Cost {
+    let shading = w.light_fragments * (1.0 - w.light_culling);
+    let shared = shading / pixels_a_cluster;
+    Cost {
+        cmd: 2.0 * w.objects * w.object_command + w.lights * w.light_command,
+        proc: 2.0 * w.vertices() + w.light_volumes() + shading * w.evaluation,
+        mem: 2.0 * w.pixels + w.light_list_floats,
+        band: (w.vertex_traffic() + 3.0 * w.object_fragments)
+            + (w.volume_traffic() + shared)
+            + (w.vertex_traffic()
+                + w.pixels * w.object_fragment_traffic
+                + w.light_fragment_traffic * shared
+                + w.pixels),
+    }
+}
+
 /// D++, section 4.11. The paper numbers two terms 3; the second is pass 4.
 pub fn visibility_buffer(w: &Workload) -> Cost {
     let shared = w.light_fragments / w.pixels_a_tile * (1.0 - w.light_culling);
@@ -314,6 +361,20 @@ mod tests {
         assert_eq!(
             tiled_deferred(&w),
             Cost { cmd: 13.0, proc: 144.0, mem: 120.0, band: 600.0 + 25.0 + 167.0 }
+        );
+        assert_eq!(
+            tiled_forward(&w),
+            Cost { cmd: 23.0, proc: 244.0, mem: 80.0, band: 300.0 + 25.0 + (200.0 + 200.0 + 7.0 + 80.0) }
+        );
+        // Of 20 pairs 10 are left, 5 pixels share a list.
+        let half = Workload { light_culling: 0.5, ..w };
+        assert_eq!(
+            clustered_deferred(&half, 5.0),
+            Cost { cmd: 13.0, proc: 134.0, mem: 120.0, band: 600.0 + 26.0 + (14.0 + 160.0) }
+        );
+        assert_eq!(
+            clustered_forward(&half, 5.0),
+            Cost { cmd: 23.0, proc: 234.0, mem: 80.0, band: 350.0 + 26.0 + (200.0 + 200.0 + 14.0 + 40.0) }
         );
         let four = Workload { shading_samples: 4.0, expected_samples: 1.5, ..w };
         assert_eq!(

@@ -1,0 +1,73 @@
+//! `clustered`: a G-buffer, lists of lights of the clusters that hold a surface, then compute shading.
+
+// ORDER: 62
+
+use afterlight_graph::{Graph, ImageHandle, gpu::vk};
+
+use crate::{
+    Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError,
+    clusters::{self, Grid},
+    cost::{Cost, Workload, clustered_deferred},
+    gbuffer,
+};
+
+/// The technique.
+pub static TECHNIQUE: Clustered = Clustered;
+
+/// See the module.
+pub struct Clustered;
+
+static INFO: Info = Info {
+    id: "clustered",
+    title: "Clustered deferred shading",
+    summary: "Surfaces fill a G-buffer; each part of the view that holds one, a tile cut into slices of depth, lists its lights.",
+    sources: &[Source { key: "petrescu-2016", section: "4.10" }, Source { key: "olsson-2012", section: "3" }],
+    answers: Answers {
+        surface: "G-buffer, 1 sample",
+        lights: "clusters",
+        schedule: "compute",
+        resolve: "one sample",
+    },
+    appendix_a: AppendixA {
+        id: "CD",
+        intersect: "exp",
+        transparency: "n",
+        hardware_msaa: "n",
+        light_access: "rand",
+        material_access: "seq",
+        rates_decoupled: "n, n",
+    },
+    exactness: Exactness::Exact { min_psnr_db: 50.0 },
+    params: clusters::PARAMS,
+    needs: &[],
+    samples: &[1],
+    tessellation: true,
+    views: &[],
+};
+
+impl Technique for Clustered {
+    fn info(&self) -> &Info {
+        &INFO
+    }
+
+    fn predict(&self, workload: &Workload, params: &Params) -> Cost {
+        clustered_deferred(workload, Grid::of_params(params, &INFO).most_pixels())
+    }
+
+    fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
+        let filled = gbuffer::fill(graph, frame, INFO.id, vk::Format::D32_SFLOAT)?;
+        let grid = Grid::of_params(frame.params, &INFO);
+        let lists = clusters::build(graph, frame, INFO.id, grid, &filled.depth)?;
+
+        let mut pass = frame.compute(graph, "clustered/shade", &frame.shader("clustered/shade.comp")?);
+        gbuffer::bind(&mut pass, &filled);
+        lists.bind(&mut pass);
+        for (constant, value) in lists.constants() {
+            pass.constant(constant, value);
+        }
+        let radiance = pass.write("hdr", filled.accumulation);
+        pass.dispatch(frame.groups(8));
+        pass.finish();
+        Ok(radiance)
+    }
+}
