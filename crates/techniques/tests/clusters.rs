@@ -15,7 +15,7 @@ use afterlight_techniques::{
     cost::{Cost, Workload},
     find, gbuffer,
     graph::{Graph, ImageHandle, gpu::vk},
-    scene::{Camera, Projection},
+    scene::{Camera, Light, LightKind, Projection, Scene},
     shader::{Shader, compile::Compiler, manifest},
 };
 use common::{Stage, image_of, psnr, sources, wider};
@@ -294,6 +294,25 @@ fn ten_thousand_lights_on_sponza() {
         let settings = stage.from(camera.clone(), (96, 54), count);
         agree(&stage, &settings, &format!("sponza, {count} lights"));
     }
+}
+
+/// Lights without an end are on no list; spot lights are listed by their spheres. An empty scene has no cluster.
+#[test]
+fn lights_of_all_kinds_and_no_surface() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=17000&texture=64");
+    let mut settings = stage.settings((96, 54), 8);
+    let position_ws = settings.camera.eye_ws() + Vec3::new(0.1, 0.3, 0.2);
+    let direction_ws = Vec3::new(0.3, -0.8, -0.5).normalize();
+    let light = |kind, range_m| Light { kind, position_ws, direction_ws, intensity: Vec3::ONE, range_m };
+    settings.lights.extend([
+        light(LightKind::Spot { inner_angle_rad: 0.3, outer_angle_rad: 0.9 }, 20.0),
+        light(LightKind::Spot { inner_angle_rad: 0.0, outer_angle_rad: 0.5 }, f32::INFINITY),
+        light(LightKind::Directional, f32::INFINITY),
+    ]);
+    agree(&stage, &settings, "all kinds");
+    let stage = Stage::of(&gpu, Scene::default());
+    agree(&stage, &stage.settings((20, 20), 3), "empty");
 }
 
 /// Every set of parameters gives the same image.
