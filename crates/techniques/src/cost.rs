@@ -306,6 +306,33 @@ pub fn clustered_forward(w: &Workload, pixels_a_cluster: f64) -> Cost {
     }
 }
 
+/// LLiD, section 4.7.
+pub fn light_list(w: &Workload) -> Cost {
+    Cost {
+        cmd: w.objects * w.object_command + w.lights * w.light_command,
+        proc: w.vertices() + w.light_volumes() + w.light_fragments * w.evaluation,
+        mem: 3.0 * w.pixels + w.light_list_floats,
+        band: (w.vertex_traffic() + w.object_fragments * (w.object_fragment_traffic + 3.0))
+            + (w.volume_traffic() + w.light_fragments)
+            + (w.light_fragments * w.light_fragment_traffic + 4.0 * w.pixels),
+    }
+}
+
+/// LLiF, section 4.7, which names it and gives no formula: derived from LPP and LLiD. The first pass is DPP's, depth alone, since
+/// lists need no normal; the second LLiD's; the third draws the objects again and walks the lists.
+pub fn light_list_forward(w: &Workload) -> Cost {
+    Cost {
+        cmd: 2.0 * w.objects * w.object_command + w.lights * w.light_command,
+        proc: w.vertices() + w.light_volumes() + (w.vertices() + w.light_fragments * w.evaluation),
+        mem: w.pixels + w.light_list_floats,
+        band: (w.vertex_traffic() + w.object_fragments)
+            + (w.volume_traffic() + w.light_fragments)
+            + (w.vertex_traffic()
+                + w.pixels * (w.object_fragment_traffic + 2.0)
+                + w.light_fragments * w.light_fragment_traffic),
+    }
+}
+
 /// D++, section 4.11. The paper numbers two terms 3; the second is pass 4.
 pub fn visibility_buffer(w: &Workload) -> Cost {
     let shared = w.light_fragments / w.pixels_a_tile * (1.0 - w.light_culling);
@@ -375,6 +402,18 @@ mod tests {
         assert_eq!(
             clustered_forward(&half, 5.0),
             Cost { cmd: 23.0, proc: 234.0, mem: 80.0, band: 350.0 + 26.0 + (200.0 + 200.0 + 14.0 + 40.0) }
+        );
+        let lists = Workload { light_list_floats: 80.0, ..w };
+        assert_eq!(
+            light_list(&lists),
+            Cost { cmd: 13.0, proc: 144.0, mem: 120.0 + 80.0, band: 600.0 + 44.0 + 300.0 }
+        );
+        // A list a pixel is a tile of one pixel.
+        let tile_a_pixel = Workload { pixels_a_tile: 1.0, ..lists };
+        assert_eq!(light_list(&lists), tiled_deferred(&tile_a_pixel));
+        assert_eq!(
+            light_list_forward(&lists),
+            Cost { cmd: 23.0, proc: 244.0, mem: 40.0 + 80.0, band: 250.0 + 44.0 + 620.0 }
         );
         let four = Workload { shading_samples: 4.0, expected_samples: 1.5, ..w };
         assert_eq!(

@@ -7,8 +7,8 @@ use afterlight_graph::{
 use afterlight_shader::Shader;
 
 use crate::{
-    SHADERS, capacity::Capacities, error::TechniqueError, indirect::Rsm, light_list::LightList,
-    params::Params, scene_gpu::SceneGpu, shadow::Shadow,
+    SHADERS, capacity::Capacities, error::TechniqueError, indirect::Rsm, lights::LightList, params::Params,
+    scene_gpu::SceneGpu, shadow::Shadow,
 };
 
 /// A frame to be recorded: the scene on the device, its buffers imported into the graph, sizes and parameters.

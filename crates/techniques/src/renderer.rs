@@ -17,7 +17,7 @@ use crate::{
     frame::{Frame, FrameBuffers},
     geometry::{MAX_DISPLACEMENT_M, MIN_TESSELLATE_PX},
     indirect::{self, Indirect},
-    light_list::LightList,
+    lights::LightList,
     params::Params,
     post::{self, Post},
     scene_gpu::{SceneGpu, upload_slice},

@@ -1,0 +1,71 @@
+//! `light-list`: a G-buffer, a list of lights a pixel, then a compute pass that walks it.
+
+// ORDER: 52
+
+use afterlight_graph::{Graph, ImageHandle, gpu::vk};
+
+use crate::{
+    Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError,
+    cost::{self, Cost, Workload},
+    gbuffer, light_lists,
+};
+
+/// The technique.
+pub static TECHNIQUE: LightList = LightList;
+
+/// See the module.
+pub struct LightList;
+
+static INFO: Info = Info {
+    id: "light-list",
+    title: "Deferred shading by per-pixel light lists",
+    summary: "Surfaces fill a G-buffer; light volumes leave in every pixel a linked list of the lights that reach it, which is then walked.",
+    sources: &[
+        Source { key: "petrescu-2016", section: "2.2" },
+        Source { key: "petrescu-2016", section: "4.7" },
+    ],
+    answers: Answers {
+        surface: "G-buffer, 1 sample",
+        lights: "per-pixel lists, by light volumes",
+        schedule: "compute, a thread a pixel",
+        resolve: "one sample",
+    },
+    appendix_a: AppendixA {
+        id: "LLiD",
+        intersect: "exp",
+        transparency: "n",
+        hardware_msaa: "n",
+        light_access: "rand",
+        material_access: "seq",
+        rates_decoupled: "n, n",
+    },
+    exactness: Exactness::Exact { min_psnr_db: 50.0 },
+    params: &[light_lists::NODES],
+    needs: &[],
+    samples: &[1],
+    tessellation: true,
+    views: &[],
+};
+
+impl Technique for LightList {
+    fn info(&self) -> &Info {
+        &INFO
+    }
+
+    fn predict(&self, workload: &Workload, _: &Params) -> Cost {
+        cost::light_list(&light_lists::with_lists(workload))
+    }
+
+    fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
+        let filled = gbuffer::fill(graph, frame, INFO.id, vk::Format::D32_SFLOAT)?;
+        let lists = light_lists::build(graph, frame, &INFO, &filled.depth)?;
+
+        let mut pass = frame.compute(graph, "light-list/shade", &frame.shader("light_list/shade.comp")?);
+        gbuffer::bind(&mut pass, &filled);
+        lists.bind(&mut pass);
+        let radiance = pass.write("hdr", filled.accumulation);
+        pass.dispatch(frame.groups(8));
+        pass.finish();
+        Ok(radiance)
+    }
+}
