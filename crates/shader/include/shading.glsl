@@ -81,8 +81,10 @@ ShadingPoint shading_point_for(Surface s, uint index) {
     return p;
 }
 
-// BRDF times cosine for light from the unit direction l.
-vec3 reflectance(ShadingPoint p, vec3 l) {
+// What a light from the unit direction l gives, apart from the colours of the surface: the BRDF times cosine is
+// (1 - f0) diffuse x + f0 y + z, by Schlick's F = f0 + (1 - f0) c^5 with c = 1 - v.h. x: (1 - c^5) n.l; y: (1 - c^5) D V n.l;
+// z: c^5 D V n.l.
+vec3 lobes(ShadingPoint p, vec3 l) {
     float n_dot_l = dot(p.normal_ws, l);
     if (n_dot_l <= 0.0) {
         return vec3(0.0);
@@ -96,27 +98,39 @@ vec3 reflectance(ShadingPoint p, vec3 l) {
     // Smith, height-correlated, divided by 4 (n.l) (n.v)
     float l_term = sqrt(n_dot_l * n_dot_l * (1.0 - p.alpha_sq) + p.alpha_sq);
     float visibility = 0.5 / (n_dot_l * p.v_term + p.n_dot_v * l_term);
-    // Schlick
     float c = 1.0 - v_dot_h;
     float c2 = c * c;
-    vec3 fresnel = p.f0 + (1.0 - p.f0) * (c2 * c2 * c);
-    return ((1.0 - fresnel) * p.diffuse + fresnel * (distribution * visibility)) * n_dot_l;
+    float grazing = c2 * c2 * c;
+    float specular = distribution * visibility;
+    return vec3(1.0 - grazing, (1.0 - grazing) * specular, grazing * specular) * n_dot_l;
 }
 
-// Radiance towards the eye that light number `index` causes; nothing beyond its range, nor in its shadow where it has one.
-vec3 light_radiance(ShadingPoint p, uint index) {
+// What a surface's colours make of light that came as the three parts of lobes(), each in RGB.
+vec3 reflected(ShadingPoint p, vec3 diffuse, vec3 specular, vec3 grazing) {
+    return (1.0 - p.f0) * p.diffuse * diffuse + p.f0 * specular + grazing;
+}
+
+// BRDF times cosine for light from the unit direction l.
+vec3 reflectance(ShadingPoint p, vec3 l) {
+    vec3 part = lobes(p, l);
+    return reflected(p, part.xxx, part.yyy, part.zzz);
+}
+
+// Light number `index` at a surface: the unit direction to it and what arrives across that direction, W/m^2 or lux. False beyond its
+// range; nothing in its shadow where it has one.
+bool light_arrives(ShadingPoint p, uint index, out vec3 l, out vec3 irradiance) {
     vec4 place = light_texel(index, 0u);
     vec3 to_light = place.xyz - p.position_ws;
     float distance_sq = max(dot(to_light, to_light), 1e-8);
     // t = (d / range)^2; a directional light has no end, so t is 0
     float t = distance_sq * place.w;
     if (t >= 1.0) {
-        return vec3(0.0);
+        return false;
     }
     uvec4 packed = texelFetch(light_data, ivec2((index & 255u) * 4u + 1u, index >> 8), 0);
     vec3 intensity = uintBitsToFloat(packed.xyz);
     uint kind = packed.w;
-    vec3 l = to_light * inversesqrt(distance_sq);
+    l = to_light * inversesqrt(distance_sq);
     // Inverse square with glTF's window: (1 - (d / range)^4) / d^2
     float attenuation = (1.0 - t * t) / distance_sq;
     if (ONLY_POINT_LIGHTS == 0u && kind != LIGHT_POINT) {
@@ -133,7 +147,14 @@ vec3 light_radiance(ShadingPoint p, uint index) {
     if (SHADOWS > 0u && index == shadow.light_index) {
         attenuation *= p.lit;
     }
-    return intensity * attenuation * reflectance(p, l);
+    irradiance = intensity * attenuation;
+    return true;
+}
+
+// Radiance towards the eye that light number `index` causes.
+vec3 light_radiance(ShadingPoint p, uint index) {
+    vec3 l, irradiance;
+    return light_arrives(p, index, l, irradiance) ? irradiance * reflectance(p, l) : vec3(0.0);
 }
 
 // Radiance of every light, in order.

@@ -149,6 +149,18 @@ pub fn deferred(w: &Workload) -> Cost {
     }
 }
 
+/// LPP, section 4.5.
+pub fn light_prepass(w: &Workload) -> Cost {
+    Cost {
+        cmd: 2.0 * w.objects * w.object_command + w.lights * w.light_command,
+        proc: w.vertices() + (w.light_volumes() + w.light_fragments * w.evaluation) + w.vertices(),
+        mem: 3.0 * w.pixels,
+        band: (w.vertex_traffic() + 2.0 * w.object_fragments)
+            + (w.volume_traffic() + w.light_fragments * (w.light_fragment_traffic + 3.0))
+            + (w.vertex_traffic() + w.pixels * (w.object_fragment_traffic + 2.0)),
+    }
+}
+
 /// DAA, section 4.4.
 pub fn deferred_msaa(w: &Workload) -> Cost {
     let s = w.shading_samples;
@@ -385,6 +397,10 @@ mod tests {
         assert_eq!(forward(&w, 3.0), Cost { cmd: 30.0, proc: 250.0, mem: 0.0, band: 550.0 });
         assert_eq!(depth_prepass(&w), Cost { cmd: 20.0, proc: 320.0, mem: 0.0, band: 730.0 });
         assert_eq!(deferred(&w), Cost { cmd: 13.0, proc: 144.0, mem: 160.0, band: 600.0 + 224.0 + 120.0 });
+        assert_eq!(
+            light_prepass(&w),
+            Cost { cmd: 23.0, proc: 100.0 + 44.0 + 100.0, mem: 120.0, band: 300.0 + 224.0 + 480.0 }
+        );
         assert_eq!(
             tiled_deferred(&w),
             Cost { cmd: 13.0, proc: 144.0, mem: 120.0, band: 600.0 + 25.0 + 167.0 }

@@ -2,7 +2,7 @@
 
 // ORDER: 40
 
-use afterlight_graph::{Blend, Graph, ImageHandle, Load, gpu::vk};
+use afterlight_graph::{Graph, ImageHandle, Load, gpu::vk};
 
 use crate::{
     Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError,
@@ -55,20 +55,12 @@ impl Technique for Deferred {
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let mut filled = gbuffer::fill(graph, frame, "deferred", vk::Format::D32_SFLOAT)?;
-        let volume =
-            volumes::volume_state(frame, Some("volumes/light.frag"), vk::CullModeFlags::FRONT, Blend::ADD)?
-                .depth(volumes::BEHIND_SURFACE);
-        let bounded = frame.lights.count - frame.lights.unbounded_count;
-
         let mut pass = graph.raster("deferred/lights");
         frame.bind_scene(&mut pass);
         gbuffer::bind(&mut pass, &filled);
         filled.accumulation = pass.color(filled.accumulation, Load::Keep);
         pass.depth_read_only(&filled.depth);
-        volumes::draw_unbounded(frame, &mut pass, "volumes/light.frag")?;
-        if bounded > 0 {
-            pass.draw(volumes::volume_draw(frame, volume, frame.lights.unbounded_count, bounded));
-        }
+        volumes::draw_all(frame, &mut pass, "volumes/light.frag", 1)?;
         pass.finish();
         Ok(filled.accumulation)
     }

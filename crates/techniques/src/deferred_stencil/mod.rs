@@ -90,19 +90,23 @@ impl Technique for DeferredStencil {
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let filled = gbuffer::fill(graph, frame, "deferred-stencil", vk::Format::D32_SFLOAT_S8_UINT)?;
-        let mark = volumes::volume_state(frame, None, vk::CullModeFlags::NONE, Blend::NONE)?
+        let mark = volumes::volume_state(frame, None, vk::CullModeFlags::NONE, vec![Blend::NONE])?
             .depth(IN_FRONT)
             .stencil(MARK);
-        let light =
-            volumes::volume_state(frame, Some("volumes/light.frag"), vk::CullModeFlags::FRONT, Blend::ADD)?
-                .stencil(MARKED);
+        let light = volumes::volume_state(
+            frame,
+            Some("volumes/light.frag"),
+            vk::CullModeFlags::FRONT,
+            vec![Blend::ADD],
+        )?
+        .stencil(MARKED);
 
         let mut pass = graph.raster("deferred-stencil/lights");
         frame.bind_scene(&mut pass);
         gbuffer::bind(&mut pass, &filled);
         let accumulation = pass.color(filled.accumulation, Load::Keep);
         let _depth = pass.stencil(filled.depth, Load::Clear(0));
-        volumes::draw_unbounded(frame, &mut pass, "volumes/light.frag")?;
+        volumes::draw_unbounded(frame, &mut pass, "volumes/light.frag", 1)?;
         for index in frame.lights.unbounded_count..frame.lights.count {
             pass.draw(volumes::volume_draw(frame, mark.clone(), index, 1));
             pass.draw(volumes::volume_draw(frame, light.clone(), index, 1));

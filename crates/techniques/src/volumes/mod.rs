@@ -87,7 +87,7 @@ fn layout() -> VertexLayout {
     }
 }
 
-/// State of a volume draw with a fragment shader, faces culled as said; depth is clamped, not clipped.
+/// State of a volume draw with a fragment shader, faces culled as said, each colour attachment blended as said; depth is clamped, not clipped.
 ///
 /// # Errors
 /// A shader that is not compiled in.
@@ -95,7 +95,7 @@ pub fn volume_state(
     frame: &Frame<'_>,
     fragment: Option<&str>,
     cull: vk::CullModeFlags,
-    blend: Blend,
+    blend: Vec<Blend>,
 ) -> Result<RasterState, TechniqueError> {
     state(frame, "volumes/volume.vert", fragment, cull, blend).map(|s| s.layout(layout()))
 }
@@ -105,11 +105,11 @@ fn state(
     vertex: &str,
     fragment: Option<&str>,
     cull: vk::CullModeFlags,
-    blend: Blend,
+    blend: Vec<Blend>,
 ) -> Result<RasterState, TechniqueError> {
     let vertex = frame.shader(vertex)?;
     let fragment = fragment.map(|name| frame.shader(name)).transpose()?;
-    let mut state = RasterState::new(&vertex, fragment.as_ref()).cull(cull).blend(vec![blend]);
+    let mut state = RasterState::new(&vertex, fragment.as_ref()).cull(cull).blend(blend);
     state.constants = frame.constants(&std::iter::once(&vertex).chain(&fragment).collect::<Vec<_>>());
     // An orthographic far plane must not cut back faces.
     state.depth_clamp = true;
@@ -130,7 +130,28 @@ pub fn volume_draw<'a>(frame: &'a Frame<'_>, state: RasterState, first: u32, cou
         .index_buffer(&frame.buffers.volume_indices, vk::IndexType::UINT16)
 }
 
-/// Draws the lights without an end over the whole image, added.
+/// Draws every light in two calls, added to `targets` colour attachments: those without an end over the whole image, then the
+/// volumes, their back faces where they lie behind the surface of a pass with depth.
+///
+/// # Errors
+/// A shader that is not compiled in.
+pub fn draw_all(
+    frame: &Frame<'_>,
+    pass: &mut RasterPass<'_>,
+    fragment: &str,
+    targets: usize,
+) -> Result<(), TechniqueError> {
+    draw_unbounded(frame, pass, fragment, targets)?;
+    let bounded = frame.lights.count - frame.lights.unbounded_count;
+    if bounded > 0 {
+        let added = vec![Blend::ADD; targets];
+        let state = volume_state(frame, Some(fragment), vk::CullModeFlags::FRONT, added)?;
+        pass.draw(volume_draw(frame, state.depth(BEHIND_SURFACE), frame.lights.unbounded_count, bounded));
+    }
+    Ok(())
+}
+
+/// Draws the lights without an end over the whole image, added to `targets` colour attachments.
 ///
 /// # Errors
 /// A shader that is not compiled in.
@@ -138,6 +159,7 @@ pub fn draw_unbounded(
     frame: &Frame<'_>,
     pass: &mut RasterPass<'_>,
     fragment: &str,
+    targets: usize,
 ) -> Result<(), TechniqueError> {
     if frame.lights.unbounded_count > 0 {
         let state = state(
@@ -145,7 +167,7 @@ pub fn draw_unbounded(
             "volumes/volume.vert#full-screen",
             Some(fragment),
             vk::CullModeFlags::NONE,
-            Blend::ADD,
+            vec![Blend::ADD; targets],
         )?;
         let call = DrawCall::Direct {
             vertices: 3,

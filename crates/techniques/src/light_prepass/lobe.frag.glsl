@@ -1,0 +1,22 @@
+// Keeps of the nearest surface what a light's lobes need and no colour (Petrescu et al. 2016, section 4.5, first pass).
+//
+// Out: 0 normal, world space, octahedral, RG16 unsigned normalised; 1 roughness, R8, 0 where the surface takes no light.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "shading.glsl"
+#include "surface_in.glsl"
+
+layout(location = 0) out vec2 normal_oct;
+layout(location = 1) out float roughness;
+
+void main() {
+    MaterialData m = load_material(draw_material.y);
+    SurfacePoint p = surface_point();
+#ifdef ALPHA_MASK
+    visible_base_color(m, p);
+#endif
+    // Its base colour is not needed, and what is not needed is not sampled.
+    Surface s = surface_at(m, p, vec3(0.0));
+    normal_oct = octahedral_encode(s.normal_ws) * 0.5 + 0.5;
+    roughness = s.unlit ? 0.0 : max(s.roughness, MIN_ROUGHNESS);
+}

@@ -1,0 +1,143 @@
+//! `light-prepass`: lights gather over depth, normals and roughness; a second pass over the surfaces applies their colours.
+
+// ORDER: 55
+
+use afterlight_graph::{DepthTest, Graph, ImageHandle, Load, gpu::vk};
+
+use crate::{
+    Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError,
+    cost::{self, Cost, Workload},
+    depth_prepass::FIRST_FRAGMENT,
+    geometry::Surfaces,
+    volumes,
+};
+
+/// The technique.
+pub static TECHNIQUE: LightPrepass = LightPrepass;
+
+/// See the module.
+pub struct LightPrepass;
+
+static INFO: Info = Info {
+    id: "light-prepass",
+    title: "Light pre-pass",
+    summary: "Lights are gathered over depth, normals and roughness; surfaces are drawn again and apply their colours.",
+    sources: &[Source { key: "petrescu-2016", section: "4.5" }, Source { key: "engel-2009", section: "all" }],
+    answers: Answers {
+        surface: "depth, normal, roughness",
+        lights: "light volumes",
+        schedule: "fragment shader",
+        resolve: "one sample",
+    },
+    appendix_a: AppendixA {
+        id: "LPP",
+        intersect: "imp",
+        transparency: "y",
+        hardware_msaa: "y",
+        light_access: "seq",
+        material_access: "rand",
+        rates_decoupled: "n, n",
+    },
+    exactness: Exactness::Exact { min_psnr_db: 50.0 },
+    params: &[],
+    needs: &[],
+    samples: &[1],
+    tessellation: true,
+    views: &[],
+};
+
+/// What the first pass keeps.
+struct LobeBuffer {
+    /// World space, octahedral, RG16.
+    normal: ImageHandle,
+    /// R8, 0 where no light is taken.
+    roughness: ImageHandle,
+    /// Reversed, with stencil for [`apply_materials`].
+    depth: ImageHandle,
+}
+
+/// The parts of light that `lobes()` of `shading.glsl` tells apart, RGBA16F, by the slots of `material.frag`.
+const SUMS: [&str; 3] = ["diffuse_light", "specular_light", "grazing_light"];
+
+impl Technique for LightPrepass {
+    fn info(&self) -> &Info {
+        &INFO
+    }
+
+    fn predict(&self, workload: &Workload, _: &Params) -> Cost {
+        cost::light_prepass(workload)
+    }
+
+    fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
+        let filled = fill(graph, frame)?;
+        let sums = gather_lights(graph, frame, &filled)?;
+        apply_materials(graph, frame, filled.depth, &sums)
+    }
+}
+
+/// First pass: depth, and what of a surface the lobes of its BRDF need.
+fn fill(graph: &mut Graph, frame: &Frame<'_>) -> Result<LobeBuffer, TechniqueError> {
+    let normal = graph.image("light-prepass/normal", frame.image_info(vk::Format::R16G16_UNORM));
+    let roughness = graph.image("light-prepass/roughness", frame.image_info(vk::Format::R8_UNORM));
+    let depth = graph.image("light-prepass/depth", frame.image_info(vk::Format::D32_SFLOAT_S8_UINT));
+    let surfaces = Surfaces::shaded(frame, "light_prepass/lobe.frag", "light_prepass/lobe.frag#mask")?;
+    let mut pass = graph.raster("light-prepass/gbuffer");
+    frame.bind_scene(&mut pass);
+    let filled = LobeBuffer {
+        // Depth 0 tells what holds nothing: the others need no clear.
+        normal: pass.color(normal, Load::DontCare),
+        roughness: pass.color(roughness, Load::DontCare),
+        depth: pass.depth(depth, Load::Clear(0.0)),
+    };
+    pass.stencil_clear(0);
+    surfaces.draw(frame, &mut pass);
+    pass.finish();
+    Ok(filled)
+}
+
+/// Second pass: the sums over all lights of what needs no colour of the surface.
+fn gather_lights(
+    graph: &mut Graph,
+    frame: &Frame<'_>,
+    filled: &LobeBuffer,
+) -> Result<[ImageHandle; 3], TechniqueError> {
+    let sums = SUMS.map(|slot| {
+        let name = format!("light-prepass/{}", slot.replace('_', " "));
+        graph.image(&name, frame.image_info(vk::Format::R16G16B16A16_SFLOAT))
+    });
+    let mut pass = graph.raster("light-prepass/lights");
+    frame.bind_scene(&mut pass);
+    pass.read("gbuffer_depth", &filled.depth);
+    pass.read("gbuffer_normal", &filled.normal);
+    pass.read("gbuffer_roughness", &filled.roughness);
+    let sums = sums.map(|sum| pass.color(sum, Load::Clear([0.0; 4])));
+    pass.depth_read_only(&filled.depth);
+    volumes::draw_all(frame, &mut pass, "light_prepass/light.frag", SUMS.len())?;
+    pass.finish();
+    Ok(sums)
+}
+
+/// Third pass: all surfaces again where their depth is equal. Where two have one depth, the stencil lets the first pass, whose
+/// normal the first pass has kept.
+fn apply_materials(
+    graph: &mut Graph,
+    frame: &Frame<'_>,
+    depth: ImageHandle,
+    sums: &[ImageHandle; 3],
+) -> Result<ImageHandle, TechniqueError> {
+    let radiance = graph.image("light-prepass/radiance", frame.image_info(vk::Format::R16G16B16A16_SFLOAT));
+    let surfaces =
+        Surfaces::shaded(frame, "light_prepass/material.frag", "light_prepass/material.frag#mask")?
+            .depth(DepthTest::EQUAL)
+            .stencil(FIRST_FRAGMENT, 1);
+    let mut pass = graph.raster("light-prepass/materials");
+    frame.bind_scene(&mut pass);
+    for (slot, sum) in SUMS.iter().zip(sums) {
+        pass.read(slot, sum);
+    }
+    let radiance = pass.color(radiance, Load::Clear(frame.background()));
+    let _depth = pass.stencil(depth, Load::Keep);
+    surfaces.draw(frame, &mut pass);
+    pass.finish();
+    Ok(radiance)
+}
