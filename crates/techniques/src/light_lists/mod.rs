@@ -1,6 +1,6 @@
 //! Lists of lights, one a pixel, for `light-list` and `light-list-forward`: see the README of this folder.
 
-use afterlight_graph::{Blend, BufferHandle, Graph, ImageHandle, gpu::vk};
+use afterlight_graph::{BufferHandle, Graph, ImageHandle, gpu::vk};
 
 use crate::{Frame, ParamInfo, ParamKind, TechniqueError, cost::Workload, frame::Slots, volumes};
 
@@ -53,9 +53,8 @@ pub fn build(
             frame,
             Some("light_lists/append.frag"),
             vk::CullModeFlags::FRONT,
-            Blend::NONE,
+            Vec::new(),
         )?
-        .blend(Vec::new())
         .depth(volumes::BEHIND_SURFACE)
         .constant("NODE_CAPACITY", capacity);
         let mut pass = graph.raster(&format!("{}/lists", info.id));
