@@ -16,9 +16,4 @@ vec4 unit_plane(vec4 plane) {
     return plane / length(plane.xyz);
 }
 
-vec4 clip_row(int i) {
-    mat4 m = frame.clip_from_world;
-    return vec4(m[0][i], m[1][i], m[2][i], m[3][i]);
-}
-
 #endif

@@ -29,6 +29,12 @@ layout(set = 0, binding = 0, scalar) uniform FrameBlock {
 
 const float PI = 3.14159265358979;
 
+// Row of clip_from_world: what a clip coordinate is the dot product of a world position with.
+vec4 clip_row(int row) {
+    mat4 m = frame.clip_from_world;
+    return vec4(m[0][row], m[1][row], m[2][row], m[3][row]);
+}
+
 // Centre of a pixel in normalised device coordinates.
 vec2 ndc_from_pixel(uvec2 pixel) {
     return (vec2(pixel) + 0.5) * 2.0 / vec2(frame.size_px) - 1.0;

@@ -37,4 +37,13 @@ vec4 visible_base_color(MaterialData m, SurfacePoint p) {
     return base;
 }
 
+#ifndef WITH_UV
+// Surface of the fragment; with ALPHA_MASK as above.
+Surface visible_surface() {
+    MaterialData m = load_material(draw_material.y);
+    SurfacePoint p = surface_point();
+    return surface_at(m, p, visible_base_color(m, p).rgb);
+}
+#endif
+
 #endif

@@ -18,6 +18,10 @@ pub(crate) const STEADY: u32 = 1;
 /// locks after 103,000 in the frame before (NVIDIA H200).
 pub(crate) const UNSTEADY: u32 = 8;
 
+/// Elements that the first frame of a view has room for: that frame is run to count what the view needs, and its memory is given
+/// back. So few that every view of a real scene needs a hundred times as many, and what a shortage does is seen at once.
+pub(crate) const FIRST_GUESS: u32 = 16;
+
 /// Frames that are run to count what is [`UNSTEADY`]: the first after a pause needs least (25,000 triangles, then 57,688).
 const UNSTEADY_FRAMES: u32 = 4;
 

@@ -160,6 +160,19 @@ impl Frame<'_> {
         self.buffers.rsm.as_ref().is_some_and(|rsm| rsm.sample_count() > 0)
     }
 
+    /// Checks that one binding holds a buffer.
+    ///
+    /// # Errors
+    /// [`TechniqueError::TooLarge`], which names `what`, the bytes and the device's limit.
+    pub fn check_binding(&self, technique: &str, what: &str, bytes: u64) -> Result<(), TechniqueError> {
+        let limit = self.features().max_storage_buffer_range;
+        if bytes > limit {
+            let what = format!("{technique}: bytes of {what}");
+            return Err(TechniqueError::TooLarge { what, found: bytes, limit });
+        }
+        Ok(())
+    }
+
     /// Whether the device is a CPU.
     pub fn is_cpu(&self) -> bool {
         self.device.info().kind == "cpu"

@@ -10,15 +10,15 @@ use afterlight_oracle::{
     tiles::light_reaches,
 };
 use afterlight_techniques::{
-    Frame, Info, Params, Prepared, Renderer, Settings, Technique, TechniqueError,
+    Frame, Info, Params, Prepared, Settings, Technique, TechniqueError,
     clusters::{self, Grid},
     cost::{Cost, Workload},
     find, gbuffer,
     graph::{Graph, ImageHandle, gpu::vk},
     scene::{Camera, Light, LightKind, Projection, Scene},
-    shader::{Shader, compile::Compiler, manifest},
+    shader::Shader,
 };
-use common::{Stage, image_of, psnr, sources, wider};
+use common::{Stage, compiled_with_header, image_of, params, psnr, sources, wider};
 use glam::{DVec4, Vec3};
 
 /// The lists of `clustered` with everything kept.
@@ -44,35 +44,11 @@ impl Technique for Lists {
 
 /// A shader of `folder/file` with text replaced in a header of the stage.
 fn mutant(name: &str, header: &str, from: &str, to: &str) -> Shader {
-    let text = std::fs::read_to_string(sources().join("clusters").join(header)).expect("a shader");
-    assert!(text.contains(from), "{header} has changed: found no {from:?}");
-    let folder = std::env::temp_dir().join(format!(
-        "afterlight-clusters-{}-{:?}",
-        std::process::id(),
-        std::thread::current().id()
-    ));
-    std::fs::create_dir_all(folder.join("clusters")).expect("a temporary folder");
-    std::fs::write(folder.join("clusters").join(header), text.replace(from, to)).expect("a file in it");
-    let path = sources().join(format!("{name}.glsl"));
-    let variant = manifest::Variant {
-        name: name.to_owned(),
-        stage: manifest::stage_of(&format!("{name}.glsl")).expect("a stage"),
-        folder: path.parent().expect("a folder").to_owned(),
-        path,
-        defines: Vec::new(),
-    };
-    let compiler = Compiler::new().include_dir(&folder).include_dir(sources());
-    let compiled = compiler.compile(&variant).unwrap_or_else(|e| panic!("{e}"));
-    std::fs::remove_dir_all(&folder).expect("the folder");
-    compiled.shader
+    compiled_with_header(name, (&sources(), &format!("clusters/{header}")), &[(from, to)])
 }
 
 fn prepare(stage: &Stage, technique: &dyn Technique, settings: &Settings, shaders: &[Shader]) -> Prepared {
-    let renderer = Renderer::with_scene(&stage.device, stage.uploaded.clone(), settings);
-    let mut renderer = renderer.unwrap_or_else(|e| panic!("{e}"));
-    renderer.add_shaders(shaders.iter().cloned());
-    let prepared = renderer.prepare(technique, &Params::default());
-    prepared.unwrap_or_else(|e| panic!("{}: {e}", technique.info().id))
+    stage.prepare_shaders(technique, settings, &Params::default(), shaders.iter().cloned())
 }
 
 fn words(prepared: &mut Prepared, name: &str) -> Vec<u32> {
@@ -329,11 +305,8 @@ fn grids_of_any_shape_agree() {
         ["33", "5", "uniform"],
         ["64", "24", "logarithmic"],
     ] {
-        let mut params = Params::default();
-        for (key, value) in [("cluster-px", cluster_px), ("slices", slices), ("slicing", slicing)] {
-            params.set(technique.info(), key, value).unwrap();
-        }
-        let mut prepared = stage.prepare_with(technique, &settings, &params);
+        let sets = [("cluster-px", cluster_px), ("slices", slices), ("slicing", slicing)];
+        let mut prepared = stage.prepare_with(technique, &settings, &params(technique, &sets));
         let db = psnr(&reference, &image_of(&mut prepared));
         println!("{cluster_px} px, {slices} slices, {slicing}: {db:.2} dB");
         assert!(db >= 50.0, "{cluster_px} px, {slices} slices, {slicing}: {db:.2} dB");
@@ -348,10 +321,8 @@ fn lists_that_find_no_room_are_told() {
     let mut settings = stage.settings((320, 180), 20_000);
     settings.lights = wider(&settings.lights, 1e4);
     let limit = gpu.features().max_storage_buffer_range;
-    let mut params = Params::default();
     let technique = find("clustered").unwrap();
-    params.set(technique.info(), "cluster-px", "8").unwrap();
-    match stage.try_prepare(technique, &settings, &params) {
+    match stage.try_prepare(technique, &settings, &params(technique, &[("cluster-px", "8")])) {
         Err(error @ TechniqueError::TooLarge { .. }) => {
             println!("{error}");
             assert!(error.to_string().contains("bytes of the lists"), "{error}");

@@ -5,11 +5,11 @@ mod common;
 use afterlight_image::Rgba8Image;
 use afterlight_oracle::raster::{RayScene, pixel_ray};
 use afterlight_techniques::{
-    Counter, Params, Renderer, Settings, Technique, find,
+    Counter, Settings, Technique, find,
     scene::{Camera, Light, LightKind},
     shader::Shader,
 };
-use common::{Stage, compiled, image_of, psnr, sources};
+use common::{Stage, compiled, image_of, params, psnr, sources};
 use glam::Vec3;
 
 const TECHNIQUES: [&str; 2] = ["light-list", "light-list-forward"];
@@ -24,14 +24,8 @@ fn rendered(
     sets: &[(&str, &str)],
     shader: Option<&Shader>,
 ) -> (Rgba8Image, Vec<Counter>) {
-    let mut params = Params::default();
-    for (key, value) in sets {
-        params.set(technique.info(), key, value).unwrap_or_else(|e| panic!("{e}"));
-    }
-    let renderer = Renderer::with_scene(&stage.device, stage.uploaded.clone(), settings);
-    let mut renderer = renderer.unwrap_or_else(|e| panic!("{e}"));
-    renderer.add_shaders(shader.cloned());
-    let mut prepared = renderer.prepare(technique, &params).unwrap_or_else(|e| panic!("{e}"));
+    let params = params(technique, sets);
+    let mut prepared = stage.prepare_shaders(technique, settings, &params, shader.cloned());
     let image = image_of(&mut prepared);
     (image, prepared.counters().unwrap_or_else(|e| panic!("{e}")))
 }

@@ -4,11 +4,11 @@ mod common;
 
 use afterlight_image::Rgba8Image;
 use afterlight_techniques::{
-    Params, Renderer, Settings, find,
+    Params, Prepared, Settings, find,
     scene::{self, Light, LightKind, Scene},
     shader::Shader,
 };
-use common::{Stage, compiled, image_of, lights_of_each_kind, psnr, sources};
+use common::{Stage, compiled, image_of, lights_of_each_kind, psnr, radiance_of, sources};
 use glam::Vec3;
 
 /// Least PSNR to `forward` of what the sums make up, dB: more than the technique's, since grazing light is little of an image.
@@ -20,13 +20,13 @@ fn mutant(file: &str, from: &str, to: &str) -> Shader {
     compiled(&format!("light_prepass/{file}"), &path, &[], &[(from, to)])
 }
 
+fn prepared_with(stage: &Stage, settings: &Settings, shaders: Option<Shader>) -> Prepared {
+    stage.prepare_shaders(find("light-prepass").unwrap(), settings, &Params::default(), shaders)
+}
+
 /// The technique's image with shaders in the place of its own.
 fn image_with(stage: &Stage, settings: &Settings, shaders: Option<Shader>) -> Rgba8Image {
-    let renderer = Renderer::with_scene(&stage.device, stage.uploaded.clone(), settings);
-    let mut renderer = renderer.unwrap_or_else(|e| panic!("{e}"));
-    renderer.add_shaders(shaders);
-    let prepared = renderer.prepare(find("light-prepass").unwrap(), &Params::default());
-    image_of(&mut prepared.unwrap_or_else(|e| panic!("{e}")))
+    image_of(&mut prepared_with(stage, settings, shaders))
 }
 
 /// Lights before and behind the surfaces, so that all parts of light are to be seen.
@@ -94,14 +94,8 @@ fn sums_beyond_their_format_stay_numbers() {
     // Beyond 32-bit floats in highlights: whether finite sums beyond 16 bits become infinite is the device's.
     settings.lights = lights_of_each_kind(&stage, above, 1e37).to_vec();
     let not_numbers = |shaders: Option<Shader>| {
-        let renderer = Renderer::with_scene(&stage.device, stage.uploaded.clone(), &settings);
-        let mut renderer = renderer.unwrap_or_else(|e| panic!("{e}"));
-        renderer.add_shaders(shaders);
-        let prepared = renderer.prepare(find("light-prepass").unwrap(), &Params::default());
-        let mut prepared = prepared.unwrap_or_else(|e| panic!("{e}"));
-        prepared.run().unwrap_or_else(|e| panic!("{e}"));
-        let rgba = prepared.hdr_rgba().unwrap_or_else(|e| panic!("{e}")).expect("kept");
-        rgba.iter().filter(|c| c.is_nan()).count()
+        let radiance = radiance_of(&mut prepared_with(&stage, &settings, shaders));
+        radiance.iter().flatten().filter(|c| c.is_nan()).count()
     };
     assert_eq!(not_numbers(None), 0);
     let unbounded = mutant(

@@ -3,7 +3,7 @@
 mod common;
 
 use afterlight_techniques::{Params, Settings, Technique, find, graph::gpu, registry, scene::Camera};
-use common::{Stage, image_of, psnr};
+use common::{Stage, image_of, params, psnr};
 use glam::Vec3;
 
 /// Least PSNR to `forward` at as many samples, dB (contract).
@@ -28,15 +28,6 @@ fn ways(id: &str) -> &'static [&'static [(&'static str, &'static str)]] {
         "dais-list" => &[&[], &[("bands", "1")], &[("bands", "3")]],
         _ => &[&[]],
     }
-}
-
-/// A technique's parameters from `key=value` words.
-fn params(technique: &dyn Technique, sets: &[(&str, &str)]) -> Params {
-    let mut params = Params::default();
-    for (key, value) in sets {
-        params.set(technique.info(), key, value).unwrap_or_else(|e| panic!("{e}"));
-    }
-    params
 }
 
 /// Every technique that renders several samples, with every value of the compared parameters.

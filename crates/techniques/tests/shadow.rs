@@ -12,9 +12,9 @@ use afterlight_techniques::{
     light_view::SourceView,
     registry,
     scene::{Light, LightKind},
-    shader::{Shader, compile::Compiler, manifest},
+    shader::Shader,
 };
-use common::{Stage, image_of, lights_of_each_kind, psnr};
+use common::{Stage, compiled_with_header, image_of, lights_of_each_kind, psnr, radiance_of, sources};
 use glam::Vec3;
 
 /// Writes an image for the eye where `AFTERLIGHT_SHADOW_IMAGES` names a folder.
@@ -103,36 +103,14 @@ fn shares(probes: &[Probe], with: &[[f32; 4]], plain: &[[f32; 4]], none: &[[f32;
 
 /// `forward/forward.frag` with a part of `shadow.glsl` replaced.
 fn mutant(from: &str, to: &str) -> Shader {
-    let crates = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let file = crates.join("shader/include/shadow.glsl");
-    let text = std::fs::read_to_string(file).expect("a shader");
-    assert!(text.contains(from), "shadow.glsl has changed: found no {from:?}");
-    let changed = std::env::temp_dir().join(format!("afterlight-shadow-{}", std::process::id()));
-    std::fs::create_dir_all(&changed).expect("a temporary folder");
-    std::fs::write(changed.join("shadow.glsl"), text.replace(from, to)).expect("a file in it");
-    let folder = crates.join("techniques/src/forward");
-    let variant = manifest::Variant {
-        name: "forward/forward.frag".to_owned(),
-        stage: manifest::stage_of("forward.frag.glsl").expect("a stage"),
-        path: folder.join("forward.frag.glsl"),
-        folder,
-        defines: Vec::new(),
-    };
-    let compiled = Compiler::new().include_dir(&changed).compile(&variant).unwrap_or_else(|e| panic!("{e}"));
-    std::fs::remove_dir_all(&changed).expect("the folder");
-    compiled.shader
+    let include = sources().join("../../shader/include");
+    compiled_with_header("forward/forward.frag", (&include, "shadow.glsl"), &[(from, to)])
 }
 
 fn radiance(stage: &Stage, settings: &Settings, shader: Option<&Shader>) -> Vec<[f32; 4]> {
     let settings = Settings { keep_hdr: true, ..settings.clone() };
-    let renderer = Renderer::with_scene(&stage.device, stage.uploaded.clone(), &settings);
-    let mut renderer = renderer.unwrap_or_else(|e| panic!("{e}"));
-    renderer.add_shaders(shader.cloned());
-    let prepared = renderer.prepare(find("forward").unwrap(), &Params::default());
-    let mut prepared = prepared.unwrap_or_else(|e| panic!("{e}"));
-    prepared.run().unwrap_or_else(|e| panic!("{e}"));
-    let rgba = prepared.hdr_rgba().unwrap_or_else(|e| panic!("{e}")).expect("kept");
-    rgba.chunks_exact(4).map(|c| [c[0], c[1], c[2], c[3]]).collect()
+    let forward = find("forward").unwrap();
+    radiance_of(&mut stage.prepare_shaders(forward, &settings, &Params::default(), shader.cloned()))
 }
 
 /// A scene whose shadows are compared to rays.

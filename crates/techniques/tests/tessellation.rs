@@ -5,14 +5,14 @@ mod common;
 
 use afterlight_image::Rgba8Image;
 use afterlight_techniques::{
-    Indirect, Params, Renderer, Settings, Technique, TechniqueError, find,
+    Indirect, Params, Settings, Technique, TechniqueError, find,
     geometry::MAX_DISPLACEMENT_M,
     graph::gpu,
     registry,
     scene::{Camera, Scene},
     shader::Shader,
 };
-use common::{Stage, compiled, image_of, psnr, sources};
+use common::{Stage, compiled, image_of, params, psnr, sources};
 use glam::{Affine3A, Quat, Vec3};
 
 /// Least PSNR of what must be one image, dB (contract: each full-rate variant to `deferred-dedup`).
@@ -27,15 +27,6 @@ fn tessellating() -> impl Iterator<Item = (&'static dyn Technique, u32)> {
 /// Settings at a technique's sample count, tessellated.
 fn tessellated(settings: &Settings, samples: u32, edge_px: f32, displacement_m: f32) -> Settings {
     Settings { samples, tessellate_px: Some(edge_px), displacement_m, ..settings.clone() }
-}
-
-/// A technique's parameters from pairs.
-fn params(technique: &dyn Technique, sets: &[(&str, &str)]) -> Params {
-    let mut params = Params::default();
-    for (key, value) in sets {
-        params.set(technique.info(), key, value).unwrap_or_else(|e| panic!("{e}"));
-    }
-    params
 }
 
 /// Whether the device has what tessellation takes, besides what all need.
@@ -257,11 +248,8 @@ fn image_with(
     sets: &[(&str, &str)],
     shader: &Shader,
 ) -> Rgba8Image {
-    let renderer = Renderer::with_scene(&stage.device, stage.uploaded.clone(), settings);
-    let mut renderer = renderer.unwrap_or_else(|e| panic!("{e}"));
-    renderer.add_shaders([shader.clone()]);
-    let prepared = renderer.prepare(technique, &params(technique, sets));
-    image_of(&mut prepared.unwrap_or_else(|e| panic!("{e}")))
+    let params = params(technique, sets);
+    image_of(&mut stage.prepare_shaders(technique, settings, &params, [shader.clone()]))
 }
 
 /// A variant of the shader in a file with a part of its text replaced.

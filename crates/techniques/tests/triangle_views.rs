@@ -3,13 +3,13 @@
 mod common;
 
 use afterlight_techniques::{
-    Params, Prepared, Renderer, Settings, Technique, find,
+    Params, Prepared, Settings, Technique, find,
     graph::gpu,
     scene::{Camera, Projection},
     shader::Shader,
     view,
 };
-use common::{Stage, compiled, sources};
+use common::{Stage, compiled, params, sources};
 
 /// Techniques whose samples refer to triangle records, in every way that they fill them.
 const WAYS: &[(&str, &[(&str, &str)])] = &[
@@ -30,11 +30,7 @@ const TEXTURE_MEAN: f64 = 1e-3;
 fn ways(samples: u32) -> impl Iterator<Item = (&'static dyn Technique, Params, String)> {
     let way = move |(id, sets): &(&'static str, &[(&str, &str)])| {
         let technique = find(id).unwrap();
-        let mut params = Params::default();
-        for (key, value) in *sets {
-            params.set(technique.info(), key, value).unwrap_or_else(|e| panic!("{e}"));
-        }
-        (technique, params, format!("{id} {sets:?}, {samples} samples"))
+        (technique, params(technique, sets), format!("{id} {sets:?}, {samples} samples"))
     };
     WAYS.iter().map(way).filter(move |(technique, ..)| technique.info().samples.contains(&samples))
 }
@@ -50,9 +46,7 @@ fn prepared(
     way: &(&dyn Technique, Params, String),
     mutant: Option<Shader>,
 ) -> Prepared {
-    let mut renderer = Renderer::with_scene(&stage.device, stage.uploaded.clone(), settings).unwrap();
-    renderer.add_shaders(mutant);
-    let mut prepared = renderer.prepare(way.0, &way.1).unwrap_or_else(|e| panic!("{}: {e}", way.2));
+    let mut prepared = stage.prepare_shaders(way.0, settings, &way.1, mutant);
     prepared.run().unwrap_or_else(|e| panic!("{e}"));
     prepared
 }

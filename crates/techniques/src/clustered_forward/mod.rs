@@ -8,7 +8,7 @@ use crate::{
     Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError,
     clusters::{self, Grid},
     cost::{Cost, Workload, clustered_forward},
-    depth_prepass::FIRST_FRAGMENT,
+    depth_prepass::{FIRST_FRAGMENT, draw_depth},
     geometry::Surfaces,
 };
 
@@ -71,15 +71,8 @@ pub(crate) fn record(
     grid: Grid,
 ) -> Result<ImageHandle, TechniqueError> {
     let name = |what: &str| format!("{technique}/{what}");
-    let depth = graph.image(&name("depth"), frame.image_info(vk::Format::D32_SFLOAT_S8_UINT));
+    let depth = draw_depth(graph, frame, technique)?;
     let radiance = graph.image(&name("radiance"), frame.image_info(vk::Format::R16G16B16A16_SFLOAT));
-    let mut pass = graph.raster(&name("depth"));
-    frame.bind_scene(&mut pass);
-    let depth = pass.depth(depth, Load::Clear(0.0));
-    pass.stencil_clear(0);
-    Surfaces::depth_only(frame)?.draw(frame, &mut pass);
-    pass.finish();
-
     let lists = clusters::build(graph, frame, technique, grid, &depth)?;
     let mut shaded =
         Surfaces::shaded(frame, "clustered_forward/shade.frag", "clustered_forward/shade.frag#mask")?

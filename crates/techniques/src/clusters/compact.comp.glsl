@@ -5,7 +5,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
-#include "clusters/sum.glsl"
+#include "group_sum.glsl"
 #include "clusters/groups.glsl"
 
 layout(set = 0, binding = 8, scalar) readonly buffer ClusterBits {

@@ -9,12 +9,10 @@ use afterlight_graph::{BufferHandle, ComputePass, Graph, ImageHandle};
 
 use crate::{
     ParamInfo, ParamKind,
+    capacity::FIRST_GUESS,
     error::TechniqueError,
     frame::{Frame, Slots},
 };
-
-/// Clusters, and entries of lists, that the first frame of a view has room for: that frame is run to count what the view needs.
-const FIRST_GUESS: u32 = 16;
 
 /// How the view is divided.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -107,12 +105,9 @@ impl Clusters {
 
 /// Checks that a binding holds the words of a buffer, and returns their bytes, at least one word.
 fn bytes_of(frame: &Frame<'_>, technique: &str, what: &str, words: u64) -> Result<u64, TechniqueError> {
-    let (found, limit) = (4 * words.max(1), frame.features().max_storage_buffer_range);
-    if found > limit {
-        let what = format!("{technique}: bytes of {what}");
-        return Err(TechniqueError::TooLarge { what, found, limit });
-    }
-    Ok(found)
+    let bytes = 4 * words.max(1);
+    frame.check_binding(technique, what, bytes)?;
+    Ok(bytes)
 }
 
 /// Declares the passes from a depth buffer of one sample to lists.

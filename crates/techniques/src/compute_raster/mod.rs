@@ -78,11 +78,7 @@ pub fn rasterize(
     let technique = info.id;
     let small_px = frame.params.number(info, SMALL.key) as u32;
     let bytes = 8 * u64::from(frame.width_px) * u64::from(frame.height_px) * u64::from(samples);
-    let limit = frame.features().max_storage_buffer_range;
-    if bytes > limit {
-        let what = format!("{technique}: bytes of a key for each of {samples} samples of every pixel");
-        return Err(TechniqueError::TooLarge { what, found: bytes, limit });
-    }
+    frame.check_binding(technique, &format!("a key for each of {samples} samples of every pixel"), bytes)?;
     let large_capacity = frame.capacity("large_triangles", FIRST_LARGE);
     let job_capacity = frame.capacity("tile_jobs", FIRST_JOBS);
     let name = |stage: &str| format!("{technique}/{stage}");

@@ -4,7 +4,7 @@
 
 mod passes;
 
-pub(crate) use passes::ScenePasses;
+pub(crate) use passes::{FillPass, depth_surfaces};
 
 use afterlight_graph::{BufferHandle, ComputePass, Graph, ImageHandle, Load, RasterPass, gpu::vk};
 
@@ -248,13 +248,14 @@ fn record_cached(
     let cache = Cache::new(graph, frame, info);
     let list = triangle_buffer::List::new(graph, frame, info.id, REFERENCES_MAX)?;
     let tags = if wide { &["wide"][..] } else { &[] };
-    let mut passes = ScenePasses::new(graph, frame, info, "dais/fill.frag", tags)?;
-    passes.fill.constants = cache.constants(&list);
+    let depth_only = depth_surfaces(frame)?;
+    let mut fill = FillPass::new(graph, frame, info, "dais/fill.frag", tags)?;
+    fill.surfaces.constants = cache.constants(&list);
 
     let mut pass = graph.raster(&name("depth"));
     frame.bind_scene(&mut pass);
     let depth = pass.depth(depth, Load::Clear(0.0));
-    passes.depth.draw(frame, &mut pass);
+    depth_only.draw(frame, &mut pass);
     pass.finish();
 
     let mut pass = graph.raster(&name("fill"));
@@ -263,7 +264,7 @@ fn record_cached(
     pass.depth_read_only(&depth);
     let _cache = cache.written_by(&mut pass);
     let list = list.written_by(&mut pass);
-    passes.draw_fill(frame, &mut pass);
+    fill.draw(frame, &mut pass);
     pass.finish();
 
     let triangles = list.derivatives(graph, frame, info.id)?;

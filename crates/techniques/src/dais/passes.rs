@@ -4,27 +4,26 @@ use afterlight_graph::{BufferHandle, DepthTest, Graph, RasterPass};
 
 use crate::{Info, error::TechniqueError, frame::Frame, geometry::Surfaces};
 
-/// What the two passes draw: depth, then, with an equal test, fragments that store their triangles. In tessellated frames both
-/// have a geometry shader, so that their depths are equal; that of the second numbers triangles and hands them on whole.
-pub(crate) struct ScenePasses {
-    /// Depth alone.
-    pub depth: Surfaces,
+/// What the first pass draws: depth alone. In tessellated frames both passes have a geometry shader, so that their depths are
+/// equal.
+///
+/// # Errors
+/// A shader that is not compiled in.
+pub(crate) fn depth_surfaces(frame: &Frame<'_>) -> Result<Surfaces, TechniqueError> {
+    let depth = Surfaces::depth_only(frame)?;
+    if frame.tessellate_px.is_some() { depth.through_geometry(frame) } else { Ok(depth) }
+}
+
+/// What the second pass draws, with an equal test: fragments that store their triangles. In tessellated frames its geometry shader
+/// numbers triangles and hands them on whole.
+pub(crate) struct FillPass {
     /// Fragments that store their triangles.
-    pub fill: Surfaces,
+    pub surfaces: Surfaces,
     numbers: Option<BufferHandle>,
 }
 
-impl ScenePasses {
-    /// Depth alone, as the first pass draws it.
-    ///
-    /// # Errors
-    /// A shader that is not compiled in.
-    pub fn depth_only(frame: &Frame<'_>) -> Result<Surfaces, TechniqueError> {
-        let depth = Surfaces::depth_only(frame)?;
-        if frame.tessellate_px.is_some() { depth.through_geometry(frame) } else { Ok(depth) }
-    }
-
-    /// `fragment` names the second pass's shader, `tags` its variant besides `mask` and `whole`.
+impl FillPass {
+    /// `fragment` names the fragment shader, `tags` its variant besides `mask` and `whole`.
     ///
     /// # Errors
     /// In a tessellated frame, a device that counts in no geometry shader.
@@ -39,27 +38,26 @@ impl ScenePasses {
         let tags = [if whole { &["whole"][..] } else { &[] }, tags].concat();
         let opaque = variant(fragment, &tags);
         let masked = variant(fragment, &[&["mask"], &tags[..]].concat());
-        let depth = Self::depth_only(frame)?;
         if !whole {
             let fill = Surfaces::new(
                 frame,
                 ("geometry/surface.vert#position", Some(&opaque)),
                 ("geometry/surface.vert#uv", &masked),
             )?;
-            return Ok(Self { depth, fill: fill.depth(DepthTest::EQUAL), numbers: None });
+            return Ok(Self { surfaces: fill.depth(DepthTest::EQUAL), numbers: None });
         }
         let fill = Surfaces::shaded(frame, &opaque, &masked)?.whole_triangles(frame, info.id)?;
         let numbers = graph.buffer(&format!("{}/triangle numbers", info.id), 4);
         let numbers = graph.clear_buffer(&format!("{}/clear triangle numbers", info.id), numbers, 0);
-        Ok(Self { depth, fill: fill.depth(DepthTest::EQUAL), numbers: Some(numbers) })
+        Ok(Self { surfaces: fill.depth(DepthTest::EQUAL), numbers: Some(numbers) })
     }
 
-    /// Binds what the second pass counts triangles with and adds its draws.
-    pub fn draw_fill(self, frame: &Frame<'_>, pass: &mut RasterPass<'_>) {
+    /// Binds what the pass counts triangles with and adds its draws.
+    pub fn draw(self, frame: &Frame<'_>, pass: &mut RasterPass<'_>) {
         if let Some(numbers) = self.numbers {
             let _numbers = pass.write("TriangleNumbers", numbers);
         }
-        self.fill.draw(frame, pass);
+        self.surfaces.draw(frame, pass);
     }
 }
 

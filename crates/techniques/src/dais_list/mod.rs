@@ -7,8 +7,9 @@ use afterlight_graph::{BufferHandle, ComputePass, Graph, ImageHandle, ImageInfo,
 use crate::{
     Answers, Exactness, Frame, Info, MULTIPLE_SAMPLES, Need, ParamInfo, ParamKind, Params, Source, Technique,
     TechniqueError,
+    capacity::FIRST_GUESS,
     cost::{self, Cost, Workload},
-    dais::{self, Cache, ScenePasses},
+    dais::{self, Cache, FillPass},
     dais_multirate::{FULL_RATE, LowRate, SHARE},
     depth_prepass::FIRST_FRAGMENT,
     gbuffer_list::{self, NOT_TAKEN},
@@ -44,9 +45,6 @@ const fn references_max(samples: u32) -> u32 {
 
 /// Rows that bands are multiples of: whole quads, and tiles of the raster part.
 const BAND_ROWS: u32 = 16;
-/// Nodes that the first frame of a view has room for: it is run to count what the view needs.
-const FIRST_GUESS: u32 = 16;
-
 static INFO: Info = Info {
     id: "dais-list",
     title: "DAIS with per-pixel lists",
@@ -79,12 +77,14 @@ impl Technique for DaisList {
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let mut lists = Lists::new(graph, frame)?;
         let mut triangles = Triangles::new(graph, frame)?;
-        let mut depth: Option<ImageHandle> = None;
-        let bands = Band::of(frame);
-        for band in &bands {
-            let image = depth.take().unwrap_or_else(|| band.depth(graph, frame));
-            let image = band.draw_depth(graph, frame, image)?;
-            (depth, lists, triangles) = band.fill(graph, frame, image, lists, triangles)?;
+        let rows = band_rows(frame);
+        // Held for one band: the next one draws over it.
+        let info = ImageInfo::new(frame.small_depth_stencil_format(), frame.width_px, rows);
+        let mut depth = graph.image("dais-list/depth", info.samples(frame.samples));
+        for (first_row, number) in (0..frame.height_px).step_by(rows as usize).zip(1..) {
+            let band = Band { number, first_row };
+            depth = band.draw_depth(graph, frame, depth)?;
+            (depth, lists, triangles) = band.fill(graph, frame, depth, lists, triangles)?;
         }
         frame.watch(graph, "nodes", &lists.node_count, lists.capacity, lists.bounded);
         let rate = LowRate::chosen(frame, &INFO)?;
@@ -114,11 +114,7 @@ impl Lists {
         let pixels = u64::from(frame.width_px) * u64::from(frame.height_px);
         let fixed: Option<u32> = frame.params.text(&INFO, NODES.key).parse().ok();
         let capacity = fixed.unwrap_or_else(|| frame.capacity("nodes", FIRST_GUESS));
-        let limit = frame.features().max_storage_buffer_range;
-        if 8 * u64::from(capacity) > limit {
-            let what = "dais-list: bytes of nodes".to_owned();
-            return Err(TechniqueError::TooLarge { what, found: 8 * u64::from(capacity), limit });
-        }
+        frame.check_binding(INFO.id, "nodes", 8 * u64::from(capacity))?;
         let zeroed = |graph: &mut Graph, name: &str, bytes: u64| {
             let buffer = graph.buffer(&format!("dais-list/{name}"), bytes);
             graph.clear_buffer(&format!("dais-list/clear {name}"), buffer, 0)
@@ -232,38 +228,28 @@ impl Stored {
     }
 }
 
+/// Rows of a band by [`BANDS`]. Tessellated triangles are numbered anew in each pass, which a cache cannot tell apart: one band.
+fn band_rows(frame: &Frame<'_>) -> u32 {
+    let bands = match frame.tessellate_px {
+        Some(_) => 1,
+        None => frame.params.number(&INFO, BANDS.key) as u32,
+    };
+    frame.height_px.div_ceil(bands).next_multiple_of(BAND_ROWS).min(frame.height_px)
+}
+
 /// Rows of the image that are drawn at once.
 struct Band {
     number: u32,
     first_row: u32,
-    rows: u32,
 }
 
 impl Band {
-    /// The bands of a frame by [`BANDS`]. Tessellated triangles are numbered anew in each pass, which a cache cannot tell apart: one
-    /// band.
-    fn of(frame: &Frame<'_>) -> Vec<Self> {
-        let count = match frame.tessellate_px {
-            Some(_) => 1,
-            None => frame.params.number(&INFO, BANDS.key) as u32,
-        };
-        let rows = frame.height_px.div_ceil(count).next_multiple_of(BAND_ROWS).min(frame.height_px);
-        let first_rows = (0..frame.height_px).step_by(rows.max(1) as usize);
-        first_rows.zip(1..).map(|(first_row, number)| Self { number, first_row, rows }).collect()
-    }
-
     /// Name of a pass over the band.
     fn pass_name(&self, pass: &str) -> String {
         match self.number {
             1 => format!("dais-list/{pass}"),
             number => format!("dais-list/{pass} {number}"),
         }
-    }
-
-    /// Declares the depth buffer that all bands share.
-    fn depth(&self, graph: &mut Graph, frame: &Frame<'_>) -> ImageHandle {
-        let info = ImageInfo::new(frame.small_depth_stencil_format(), frame.width_px, self.rows);
-        graph.image("dais-list/depth", info.samples(frame.samples))
     }
 
     /// The whole image, of which attachments hold the band.
@@ -277,7 +263,7 @@ impl Band {
         frame: &Frame<'_>,
         depth: ImageHandle,
     ) -> Result<ImageHandle, TechniqueError> {
-        let surfaces = ScenePasses::depth_only(frame)?;
+        let surfaces = dais::depth_surfaces(frame)?;
         let mut pass = graph.raster(&self.pass_name("depth"));
         frame.bind_scene(&mut pass);
         let depth = pass.depth(depth, Load::Clear(0.0));
@@ -294,19 +280,19 @@ impl Band {
         depth: ImageHandle,
         lists: Lists,
         triangles: Triangles,
-    ) -> Result<(Option<ImageHandle>, Lists, Triangles), TechniqueError> {
-        let mut passes = ScenePasses::new(graph, frame, &INFO, "dais_list/fill.frag", &[])?;
-        let fill = &mut passes.fill;
-        (fill.stencil, fill.stencil_reference) = (Some(FIRST_FRAGMENT), 1);
-        fill.masked_stencil = Some(NOT_TAKEN);
-        fill.constants = triangles.constants();
+    ) -> Result<(ImageHandle, Lists, Triangles), TechniqueError> {
+        let mut fill = FillPass::new(graph, frame, &INFO, "dais_list/fill.frag", &[])?;
+        let surfaces = &mut fill.surfaces;
+        (surfaces.stencil, surfaces.stencil_reference) = (Some(FIRST_FRAGMENT), 1);
+        surfaces.masked_stencil = Some(NOT_TAKEN);
+        surfaces.constants = triangles.constants();
         let bounded = u32::from(lists.bounded);
         for (name, value) in
             [("SAMPLES", frame.samples), ("NODE_CAPACITY", lists.capacity), ("BOUNDED", bounded)]
         {
-            fill.constants.push((name.to_owned(), value));
+            surfaces.constants.push((name.to_owned(), value));
         }
-        fill.push = self.first_row.to_le_bytes().to_vec();
+        surfaces.push = self.first_row.to_le_bytes().to_vec();
 
         let mut pass = graph.raster(&self.pass_name("fill"));
         frame.bind_scene(&mut pass);
@@ -314,8 +300,8 @@ impl Band {
         pass.viewport(self.viewport(frame));
         let lists = lists.written_by(&mut pass);
         let triangles = triangles.written_by(&mut pass);
-        passes.draw_fill(frame, &mut pass);
+        fill.draw(frame, &mut pass);
         pass.finish();
-        Ok((Some(depth), lists, triangles))
+        Ok((depth, lists, triangles))
     }
 }

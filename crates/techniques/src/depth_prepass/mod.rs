@@ -59,6 +59,27 @@ pub(crate) const FIRST_FRAGMENT: StencilTest = {
     StencilTest { front: face, back: face, compare_mask: 0xff, write_mask: 0xff }
 };
 
+/// Declares the pass `technique/depth`: depth, reversed, of the frame's samples, and a stencil of zeros for [`FIRST_FRAGMENT`].
+///
+/// # Errors
+/// A shader that is not compiled in.
+pub(crate) fn draw_depth(
+    graph: &mut Graph,
+    frame: &Frame<'_>,
+    technique: &str,
+) -> Result<ImageHandle, TechniqueError> {
+    let name = format!("{technique}/depth");
+    let depth = graph.image(&name, frame.multisampled_info(vk::Format::D32_SFLOAT_S8_UINT));
+    let surfaces = Surfaces::depth_only(frame)?;
+    let mut pass = graph.raster(&name);
+    frame.bind_scene(&mut pass);
+    let depth = pass.depth(depth, Load::Clear(0.0));
+    pass.stencil_clear(0);
+    surfaces.draw(frame, &mut pass);
+    pass.finish();
+    Ok(depth)
+}
+
 impl Technique for DepthPrepass {
     fn info(&self) -> &Info {
         &INFO
@@ -70,19 +91,10 @@ impl Technique for DepthPrepass {
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let target = RadianceTarget::new(graph, frame, "depth-prepass");
-        let depth =
-            graph.image("depth-prepass/depth", frame.multisampled_info(vk::Format::D32_SFLOAT_S8_UINT));
-        let depth_only = Surfaces::depth_only(frame)?;
         let shaded = shaded_surfaces(frame)?.depth(DepthTest::EQUAL).stencil(FIRST_FRAGMENT, 1);
         let mut count = frame.shows(INVOCATIONS).then(|| InvocationCount::new(graph, frame, "depth-prepass"));
 
-        let mut pass = graph.raster("depth-prepass/depth");
-        frame.bind_scene(&mut pass);
-        let depth = pass.depth(depth, Load::Clear(0.0));
-        pass.stencil_clear(0);
-        depth_only.draw(frame, &mut pass);
-        pass.finish();
-
+        let depth = draw_depth(graph, frame, INFO.id)?;
         let mut pass = graph.raster("depth-prepass/shade");
         frame.bind_scene(&mut pass);
         count = count.map(|count| count.bind(&mut pass));

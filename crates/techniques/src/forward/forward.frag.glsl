@@ -9,10 +9,7 @@
 layout(location = 0) out vec4 radiance_out;
 
 void main() {
-    MaterialData m = load_material(draw_material.y);
-    SurfacePoint p = surface_point();
-    vec4 base = visible_base_color(m, p);
+    Surface s = visible_surface();
     count_invocation();
-    Surface s = surface_at(m, p, base.rgb);
     radiance_out = vec4(surface_radiance(s), 1.0);
 }

@@ -12,10 +12,7 @@ layout(push_constant, scalar) uniform Push {
 layout(location = 0) out vec4 radiance_out;
 
 void main() {
-    MaterialData m = load_material(draw_material.y);
-    SurfacePoint p = surface_point();
-    vec4 base = visible_base_color(m, p);
-    Surface s = surface_at(m, p, base.rgb);
+    Surface s = visible_surface();
 #ifdef AMBIENT_PASS
     radiance_out = vec4(unlit_radiance(s), 1.0);
 #else

@@ -13,10 +13,7 @@ layout(location = 2) out vec2 normal_oct;
 layout(location = 3) out float roughness;
 
 void main() {
-    MaterialData m = load_material(draw_material.y);
-    SurfacePoint p = surface_point();
-    vec4 base = visible_base_color(m, p);
-    Surface s = surface_at(m, p, base.rgb);
+    Surface s = visible_surface();
     accumulation = vec4(unlit_radiance(s), 1.0);
     base_color_metallic = vec4(s.base_color, s.metallic);
     normal_oct = octahedral_encode(s.normal_ws) * 0.5 + 0.5;

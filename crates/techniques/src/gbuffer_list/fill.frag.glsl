@@ -16,11 +16,8 @@ layout(early_fragment_tests) in;
 layout(post_depth_coverage) in;
 
 void main() {
-    MaterialData m = load_material(draw_material.y);
-    SurfacePoint p = surface_point();
-    vec4 base = visible_base_color(m, p);
-    Surface s = surface_at(m, p, base.rgb);
-    float distance_m = max(dot(frame.distance_from_world, vec4(p.position_ws, 1.0)), 0.0);
+    Surface s = visible_surface();
+    float distance_m = max(dot(frame.distance_from_world, vec4(s.position_ws, 1.0)), 0.0);
 
     ivec2 pixel = ivec2(gl_FragCoord.xy);
     uint head = pixel_block(pixel);

@@ -34,11 +34,6 @@ float row_dot(vec4 row, vec3 p) {
     return sum;
 }
 
-vec4 clip_row(int row) {
-    mat4 m = frame.clip_from_world;
-    return vec4(m[0][row], m[1][row], m[2][row], m[3][row]);
-}
-
 // Where a point stands on screen, pixels from its centre; points behind the near plane as if they stood on it.
 vec2 screen_px(vec3 p) {
     vec4 k = frame.depth_to_distance;

@@ -39,10 +39,7 @@ vec3 flux_through_plane(vec3 position_ws) {
 }
 
 void main() {
-    MaterialData m = load_material(draw_material.y);
-    SurfacePoint p = surface_point();
-    vec4 base = visible_base_color(m, p);
-    Surface s = surface_at(m, p, base.rgb);
+    Surface s = visible_surface();
     surface = uvec4(floatBitsToUint(s.position_ws), packSnorm2x16(octahedral_encode(s.normal_ws)));
     vec3 diffuse = s.unlit ? vec3(0.0) : s.base_color * (1.0 - s.metallic) / PI;
     flux = vec4(diffuse * flux_through_plane(s.position_ws), 1.0);

@@ -8,10 +8,7 @@
 layout(location = 0) out vec4 radiance_out;
 
 void main() {
-    MaterialData m = load_material(draw_material.y);
-    SurfacePoint p = surface_point();
-    vec4 base = visible_base_color(m, p);
-    Surface s = surface_at(m, p, base.rgb);
+    Surface s = visible_surface();
     vec3 radiance = unlit_radiance(s);
     if (!s.unlit) {
         radiance += listed_radiance(shading_point(s), uvec2(gl_FragCoord.xy));

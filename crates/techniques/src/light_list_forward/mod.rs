@@ -2,12 +2,12 @@
 
 // ORDER: 54
 
-use afterlight_graph::{DepthTest, Graph, ImageHandle, Load, gpu::vk};
+use afterlight_graph::{DepthTest, Graph, ImageHandle, Load};
 
 use crate::{
     Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError,
     cost::{self, Cost, Workload},
-    depth_prepass::FIRST_FRAGMENT,
+    depth_prepass::{FIRST_FRAGMENT, draw_depth},
     geometry::Surfaces,
     light_lists,
     radiance_target::RadianceTarget,
@@ -60,15 +60,7 @@ impl Technique for LightListForward {
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
-        let depth = graph.image("light-list-forward/depth", frame.image_info(vk::Format::D32_SFLOAT_S8_UINT));
-        let depth_only = Surfaces::depth_only(frame)?;
-        let mut pass = graph.raster("light-list-forward/depth");
-        frame.bind_scene(&mut pass);
-        let depth = pass.depth(depth, Load::Clear(0.0));
-        pass.stencil_clear(0);
-        depth_only.draw(frame, &mut pass);
-        pass.finish();
-
+        let depth = draw_depth(graph, frame, INFO.id)?;
         let lists = light_lists::build(graph, frame, &INFO, &depth)?;
 
         let target = RadianceTarget::new(graph, frame, INFO.id);

@@ -5,11 +5,10 @@
 // In: light_lists_depth. Out: LightHeads, LightNodes, LightNodeCount.
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#include "frame.glsl"
+#include "culling.glsl"
 
 layout(early_fragment_tests) in;
 
-layout(set = 0, binding = 5) uniform texture2D light_spheres;
 layout(set = 0, binding = 8) uniform texture2D light_lists_depth;
 layout(set = 0, binding = 14, scalar) buffer LightHeads {
     uint light_heads[];
@@ -29,7 +28,7 @@ const uint MOST_NEEDED = 0xf0000000u;
 layout(location = 0) flat in uint light_index;
 
 bool is_within_range(ivec2 pixel) {
-    vec4 sphere = texelFetch(light_spheres, ivec2(light_index & 1023u, light_index >> 10), 0);
+    vec4 sphere = light_sphere(light_index);
     float depth = texelFetch(light_lists_depth, pixel, 0).r;
     vec3 to_light = sphere.xyz - position_from_depth(ndc_from_pixel(uvec2(pixel)), depth);
     return depth > 0.0 && dot(to_light, to_light) <= sphere.w * sphere.w;

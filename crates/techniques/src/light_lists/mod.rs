@@ -2,7 +2,9 @@
 
 use afterlight_graph::{BufferHandle, Graph, ImageHandle, gpu::vk};
 
-use crate::{Frame, ParamInfo, ParamKind, TechniqueError, cost::Workload, frame::Slots, volumes};
+use crate::{
+    Frame, ParamInfo, ParamKind, TechniqueError, capacity::FIRST_GUESS, cost::Workload, frame::Slots, volumes,
+};
 
 /// Nodes of the lists.
 pub const NODES: ParamInfo = ParamInfo {
@@ -14,8 +16,6 @@ pub const NODES: ParamInfo = ParamInfo {
 
 /// Most nodes, below where the count on the device ends.
 const MOST_NODES: u32 = 1 << 30;
-/// Nodes that the first frame of a view has room for: it is run to count what the view needs.
-const FIRST_GUESS: u32 = 16;
 
 /// The lists of a frame: a head of 4 bytes a pixel, nodes of 8 bytes.
 pub struct LightLists {
@@ -37,8 +37,8 @@ pub fn build(
     let pixels = u64::from(frame.width_px) * u64::from(frame.height_px);
     let fixed: Option<u32> = frame.params.text(info, NODES.key).parse().ok();
     let capacity = fixed.unwrap_or_else(|| frame.capacity(NODES.key, FIRST_GUESS));
-    check_size(frame, info, "heads", 4 * pixels)?;
-    check_size(frame, info, "nodes", 8 * u64::from(capacity))?;
+    frame.check_binding(info.id, "light heads", 4 * pixels)?;
+    frame.check_binding(info.id, "light nodes", 8 * u64::from(capacity))?;
     let zeroed = |graph: &mut Graph, name: &str, bytes: u64| {
         let buffer = graph.buffer(&format!("{}/{name}", info.id), bytes);
         graph.clear_buffer(&format!("{}/clear {name}", info.id), buffer, 0)
@@ -84,13 +84,4 @@ impl LightLists {
 /// The workload with the lists' memory: a float a pixel, two a pair of a light and a pixel.
 pub fn with_lists(workload: &Workload) -> Workload {
     Workload { light_list_floats: workload.pixels + 2.0 * workload.light_fragments, ..*workload }
-}
-
-fn check_size(frame: &Frame<'_>, info: &crate::Info, what: &str, bytes: u64) -> Result<(), TechniqueError> {
-    let limit = frame.features().max_storage_buffer_range;
-    if bytes > limit {
-        let what = format!("{}: bytes of light {what}", info.id);
-        return Err(TechniqueError::TooLarge { what, found: bytes, limit });
-    }
-    Ok(())
 }

@@ -17,10 +17,7 @@ vec3 gathered(texture2D light) {
 }
 
 void main() {
-    MaterialData m = load_material(draw_material.y);
-    SurfacePoint p = surface_point();
-    vec4 base = visible_base_color(m, p);
-    Surface s = surface_at(m, p, base.rgb);
+    Surface s = visible_surface();
     radiance_out = vec4(unlit_radiance(s), 1.0);
     if (!s.unlit) {
         radiance_out.rgb += reflected(

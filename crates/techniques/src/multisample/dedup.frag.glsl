@@ -20,10 +20,7 @@ layout(location = 4) out vec3 emission;
 #endif
 
 void main() {
-    MaterialData m = load_material(draw_material.y);
-    SurfacePoint p = surface_point();
-    vec4 base = visible_base_color(m, p);
-    Surface s = surface_at(m, p, base.rgb);
+    Surface s = visible_surface();
     base_color_metallic = vec4(s.base_color, s.metallic);
     uvec2 normal = uvec2(round((octahedral_encode(s.normal_ws) * 0.5 + 0.5) * 4095.0));
     uint roughness = s.unlit ? 0u : uint(round(clamp(s.roughness, MIN_ROUGHNESS, 1.0) * 255.0));
@@ -34,7 +31,7 @@ void main() {
     uint id = draw_material.x << TRIANGLE_BITS | uint(gl_PrimitiveID);
 #endif
     triangle_id = unpackUnorm4x8(id);
-    float distance_m = max(dot(frame.distance_from_world, vec4(p.position_ws, 1.0)), 0.0);
+    float distance_m = max(dot(frame.distance_from_world, vec4(s.position_ws, 1.0)), 0.0);
     uint distance_bits = min(floatBitsToUint(distance_m) + 64u >> 7, 0xffffffu);
     distance_occlusion = unpackUnorm4x8(distance_bits | uint(round(s.occlusion * 255.0)) << 24);
 #ifdef EMISSION

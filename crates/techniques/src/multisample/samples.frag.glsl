@@ -20,10 +20,7 @@ layout(location = 3) out vec3 emission;
 #endif
 
 void main() {
-    MaterialData m = load_material(draw_material.y);
-    SurfacePoint p = surface_point();
-    vec4 base = visible_base_color(m, p);
-    Surface s = surface_at(m, p, base.rgb);
+    Surface s = visible_surface();
     base_color_metallic = vec4(s.base_color, s.metallic);
     normal_oct = octahedral_encode(s.normal_ws) * 0.5 + 0.5;
     float roughness = s.unlit ? 0.0 : max(s.roughness, MIN_ROUGHNESS);

@@ -9,7 +9,7 @@
 use afterlight_graph::{BufferHandle, ComputePass, Graph, RasterPass};
 
 use crate::{
-    capacity,
+    capacity::{self, FIRST_GUESS},
     error::TechniqueError,
     frame::{Frame, Slots},
     multisample::Visible,
@@ -17,9 +17,6 @@ use crate::{
     view,
 };
 
-/// Triangles that the first frame of a view has room for: that frame is run to count what the view needs, and its memory is
-/// given back. So few that every view of a real scene needs a hundred times as many, and what a shortage does is seen at once.
-const FIRST_GUESS: u32 = 16;
 /// Words of 32 bits for a draw's triangles.
 const WORDS_A_DRAW: u64 = DRAW_TRIANGLES as u64 / 32;
 /// Triangles of a group: `local_size_x` in `derivatives.comp.glsl`.
@@ -170,11 +167,7 @@ pub fn capacity(frame: &Frame<'_>) -> u32 {
 fn room(frame: &Frame<'_>, technique: &str) -> Result<(u32, u64), TechniqueError> {
     let capacity = capacity(frame);
     let bytes = record_bytes(frame) * u64::from(capacity);
-    let limit = frame.features().max_storage_buffer_range;
-    if bytes > limit {
-        let what = format!("{technique}: bytes of the triangle buffer for {capacity} triangles");
-        return Err(TechniqueError::TooLarge { what, found: bytes, limit });
-    }
+    frame.check_binding(technique, &format!("the triangle buffer for {capacity} triangles"), bytes)?;
     Ok((capacity, bytes.max(4)))
 }
 

@@ -4,8 +4,8 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
+#include "group_sum.glsl"
 
-layout(local_size_x = 256) in;
 layout(set = 0, binding = 8, scalar) readonly buffer VisibleOfDraw {
     uint visible_of_draw[];
 };
@@ -19,32 +19,20 @@ layout(set = 0, binding = 10, scalar) writeonly buffer TriangleCount {
 layout(constant_id = 10) const uint DRAWS = 0u;
 layout(constant_id = 11) const uint TRIANGLE_CAPACITY = 0u;
 
-shared uint sums[256];
-
 void main() {
-    uint lane = gl_LocalInvocationID.x;
-    uint a_lane = (DRAWS + 255u) / 256u;
-    uint first = min(lane * a_lane, DRAWS), end = min(first + a_lane, DRAWS);
-    uint sum = 0u;
-    for (uint draw = first; draw < end; ++draw) {
-        sum += visible_of_draw[draw];
+    uvec2 draws = elements_of_thread(DRAWS);
+    uint own = 0u;
+    for (uint draw = draws.x; draw < draws.y; ++draw) {
+        own += visible_of_draw[draw];
     }
-    sums[lane] = sum;
-    barrier();
-    // Hillis and Steele's inclusive scan.
-    for (uint step = 1u; step < 256u; step *= 2u) {
-        uint other = lane >= step ? sums[lane - step] : 0u;
-        barrier();
-        sums[lane] += other;
-        barrier();
-    }
-    uint base = sums[lane] - sum;
-    for (uint draw = first; draw < end; ++draw) {
+    uint total;
+    uint base = sum_before(own, total);
+    for (uint draw = draws.x; draw < draws.y; ++draw) {
         draw_base_out[draw] = base;
         base += visible_of_draw[draw];
     }
-    if (lane == 255u) {
-        triangles_needed = sums[255];
-        triangles_dropped = max(sums[255], TRIANGLE_CAPACITY) - TRIANGLE_CAPACITY;
+    if (gl_LocalInvocationID.x == 0u) {
+        triangles_needed = total;
+        triangles_dropped = max(total, TRIANGLE_CAPACITY) - TRIANGLE_CAPACITY;
     }
 }

@@ -71,6 +71,21 @@ impl Stage {
         Renderer::with_scene(&self.device, self.uploaded.clone(), settings)?.prepare(technique, params)
     }
 
+    /// A technique made ready with parameters and with shaders in place of its own.
+    pub fn prepare_shaders(
+        &self,
+        technique: &dyn Technique,
+        settings: &Settings,
+        params: &Params,
+        shaders: impl IntoIterator<Item = Shader>,
+    ) -> Prepared {
+        let renderer = Renderer::with_scene(&self.device, self.uploaded.clone(), settings);
+        let mut renderer = renderer.unwrap_or_else(|e| panic!("{e}"));
+        renderer.add_shaders(shaders);
+        let prepared = renderer.prepare(technique, params);
+        prepared.unwrap_or_else(|e| panic!("{}: {e}", technique.info().id))
+    }
+
     /// A technique's image.
     pub fn image(&self, technique: &dyn Technique, settings: &Settings) -> Rgba8Image {
         let mut prepared = self.prepare(technique, settings);
@@ -79,11 +94,24 @@ impl Stage {
 
     /// A technique's linear radiance, RGBA.
     pub fn radiance(&self, technique: &dyn Technique, settings: &Settings) -> Vec<[f32; 4]> {
-        let mut prepared = self.prepare(technique, &Settings { keep_hdr: true, ..settings.clone() });
-        prepared.run().unwrap_or_else(|e| panic!("{e}"));
-        let rgba = prepared.hdr_rgba().unwrap_or_else(|e| panic!("{e}")).expect("kept");
-        rgba.chunks_exact(4).map(|c| [c[0], c[1], c[2], c[3]]).collect()
+        radiance_of(&mut self.prepare(technique, &Settings { keep_hdr: true, ..settings.clone() }))
     }
+}
+
+/// A technique's parameters from `key=value` words.
+pub fn params(technique: &dyn Technique, sets: &[(&str, &str)]) -> Params {
+    let mut params = Params::default();
+    for (key, value) in sets {
+        params.set(technique.info(), key, value).unwrap_or_else(|e| panic!("{e}"));
+    }
+    params
+}
+
+/// Runs a frame and reads its linear radiance, RGBA, which it was asked to keep.
+pub fn radiance_of(prepared: &mut Prepared) -> Vec<[f32; 4]> {
+    prepared.run().unwrap_or_else(|e| panic!("{e}"));
+    let rgba = prepared.hdr_rgba().unwrap_or_else(|e| panic!("{e}")).expect("kept");
+    rgba.chunks_exact(4).map(|c| [c[0], c[1], c[2], c[3]]).collect()
 }
 
 /// A directional, a spot and a point light at a place, towards the scene's centre; about as bright there.
@@ -132,26 +160,63 @@ pub fn sources() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
 }
 
-/// Compiles a shader of this crate or of its tests under a name, with parts of its text replaced.
-pub fn compiled(name: &str, path: &Path, defines: &[&str], replaced: &[(&str, &str)]) -> Shader {
+/// Text of a shader with parts replaced.
+fn replaced_text(path: &Path, replaced: &[(&str, &str)]) -> String {
     let mut text = std::fs::read_to_string(path).expect("a shader");
     for (from, to) in replaced {
-        assert!(text.contains(from), "{name} has changed: found no {from:?}");
+        assert!(text.contains(from), "{} has changed: found no {from:?}", path.display());
         text = text.replace(from, to);
     }
-    let file = path.file_name().expect("a file").to_str().expect("a name");
-    // Tests of one process compile at the same time.
+    text
+}
+
+/// Compiles a shader of this crate or of its tests under a name, with parts of its text replaced.
+pub fn compiled(name: &str, path: &Path, defines: &[&str], replaced: &[(&str, &str)]) -> Shader {
+    let file = path.file_name().expect("a file");
+    in_temporary_folder(|folder| {
+        let written = folder.join(file);
+        std::fs::write(&written, replaced_text(path, replaced)).expect("a file in the temporary folder");
+        compile(name, &written, path.parent().expect("a folder"), defines, folder)
+    })
+}
+
+/// Compiles a shader of this crate with parts of a header's text replaced: `header` is what shaders include of what stands in
+/// `folder`.
+pub fn compiled_with_header(
+    name: &str,
+    (folder, header): (&Path, &str),
+    replaced: &[(&str, &str)],
+) -> Shader {
+    in_temporary_folder(|changed| {
+        let written = changed.join(header);
+        std::fs::create_dir_all(written.parent().expect("a folder")).expect("a temporary folder");
+        let text = replaced_text(&folder.join(header), replaced);
+        std::fs::write(&written, text).expect("a file in the temporary folder");
+        let path = sources().join(format!("{name}.glsl"));
+        compile(name, &path, path.parent().expect("a folder"), &[], changed)
+    })
+}
+
+/// A folder for one call: tests of one process compile at the same time.
+fn in_temporary_folder<T>(use_it: impl FnOnce(&Path) -> T) -> T {
     let thread = format!("{:?}", std::thread::current().id()).replace(['(', ')'], "");
-    let written = std::env::temp_dir().join(format!("afterlight-{}-{thread}-{file}", std::process::id()));
-    std::fs::write(&written, text).expect("a file in the temporary folder");
+    let folder = std::env::temp_dir().join(format!("afterlight-{}-{thread}", std::process::id()));
+    std::fs::create_dir_all(&folder).expect("a temporary folder");
+    let result = use_it(&folder);
+    std::fs::remove_dir_all(&folder).expect("the folder");
+    result
+}
+
+/// Compiles a file as if it stood in `folder`; headers in `first` come before others of their names.
+fn compile(name: &str, path: &Path, folder: &Path, defines: &[&str], first: &Path) -> Shader {
+    let file = path.file_name().expect("a file").to_str().expect("a name");
     let variant = manifest::Variant {
         name: name.to_owned(),
         stage: manifest::stage_of(file).expect("a stage"),
-        path: written.clone(),
-        folder: path.parent().expect("a folder").to_owned(),
+        path: path.to_owned(),
+        folder: folder.to_owned(),
         defines: defines.iter().map(|d| ((*d).to_owned(), None)).collect(),
     };
-    let found = Compiler::new().include_dir(sources()).compile(&variant).unwrap_or_else(|e| panic!("{e}"));
-    std::fs::remove_file(&written).expect("the file");
-    found.shader
+    let compiler = Compiler::new().include_dir(first).include_dir(sources());
+    compiler.compile(&variant).unwrap_or_else(|e| panic!("{e}")).shader
 }

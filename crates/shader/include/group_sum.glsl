@@ -1,7 +1,7 @@
 // Sums over a group of 256 threads that end at the greatest number instead of beginning again at 0: what does not fit must not
 // look as if it did.
-#ifndef AFTERLIGHT_CLUSTER_SUM
-#define AFTERLIGHT_CLUSTER_SUM
+#ifndef AFTERLIGHT_GROUP_SUM
+#define AFTERLIGHT_GROUP_SUM
 
 layout(local_size_x = 256) in;
 shared uint sums[256];
