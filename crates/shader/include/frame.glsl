@@ -21,6 +21,7 @@ struct FrameConstants {
     uint light_count;
     vec3 background_radiance;
     uint unbounded_light_count; // lights without an end, first in the list
+    vec2 distance_range_m;      // nearest and farthest view distance that a surface of the scene can have, the first above 0
 };
 
 layout(set = 0, binding = 0, scalar) uniform FrameBlock {

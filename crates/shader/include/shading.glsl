@@ -8,26 +8,8 @@
 #include "frame.glsl"
 #include "material.glsl"
 #include "indirect.glsl"
+#include "light_data.glsl"
 #include "shadow.glsl"
-
-// A light is four texels of an RGBA32UI image, 256 lights a row. An image and not a buffer, since a texel comes with one
-// vector load where lavapipe reads a buffer word by word and lane by lane.
-//
-//   0  position in world space, m; 1 / range^2, 1/m^2, 0 where it has no end
-//   1  intensity, candela, or lux where directional; the kind
-//   2  unit direction in which it shines; range, m
-//   3  spot: scale and offset of the angular falloff clamp(cos * scale + offset)^2; unused; unused
-layout(set = 0, binding = 4) uniform utexture2D light_data;
-const uint LIGHT_POINT = 0u;
-const uint LIGHT_SPOT = 1u;
-const uint LIGHT_DIRECTIONAL = 2u;
-
-vec4 light_texel(uint index, uint texel) {
-    return uintBitsToFloat(texelFetch(light_data, ivec2((index & 255u) * 4u + texel, index >> 8), 0));
-}
-
-// 1 where every light is a point light, so that the code for the others goes.
-layout(constant_id = 6) const uint ONLY_POINT_LIGHTS = 0u;
 
 // Perceptual roughness below this makes highlights that neither pixels nor 32-bit floats resolve.
 const float MIN_ROUGHNESS = 0.045;

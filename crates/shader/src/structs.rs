@@ -27,6 +27,8 @@ shader_struct! {
         pub background_radiance: [f32; 3],
         /// Lights without an end (directional, or no range): the first of the list.
         pub unbounded_light_count: u32,
+        /// Nearest and farthest view distance that a surface of the scene can have, metres, the first above 0.
+        pub distance_range_m: [f32; 2],
     }
 
     /// How indirect light is gathered from a reflective shadow map (`include/indirect.glsl`).

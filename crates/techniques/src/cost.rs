@@ -287,6 +287,23 @@ pub fn tiled_forward(w: &Workload) -> Cost {
     }
 }
 
+/// F+, section 4.9.
+pub fn forward_plus(w: &Workload) -> Cost {
+    let shading = w.light_fragments * (1.0 - w.light_culling);
+    let shared = shading / w.pixels_a_tile;
+    Cost {
+        cmd: 2.0 * w.objects * w.object_command + w.lights * w.light_command,
+        proc: 2.0 * w.vertices() + w.light_volumes() + shading * w.evaluation,
+        mem: 3.0 * w.pixels + w.light_list_floats,
+        band: (w.vertex_traffic() + w.object_fragments)
+            + (w.volume_traffic() + shared)
+            + (w.vertex_traffic()
+                + w.pixels * w.object_fragment_traffic
+                + w.light_fragment_traffic * shared
+                + w.pixels),
+    }
+}
+
 /// CD, section 4.10; `pixels_a_cluster`: c in lf/c.
 pub fn clustered_deferred(w: &Workload, pixels_a_cluster: f64) -> Cost {
     let shading = w.light_fragments * (1.0 - w.light_culling);
@@ -411,6 +428,10 @@ mod tests {
         );
         // Of 20 pairs 10 are left, 5 pixels share a list.
         let half = Workload { light_culling: 0.5, ..w };
+        assert_eq!(
+            forward_plus(&Workload { pixels_a_tile: 5.0, ..half }),
+            Cost { cmd: 23.0, proc: 234.0, mem: 120.0, band: 250.0 + 26.0 + (200.0 + 200.0 + 14.0 + 40.0) }
+        );
         assert_eq!(
             clustered_deferred(&half, 5.0),
             Cost { cmd: 13.0, proc: 134.0, mem: 120.0, band: 600.0 + 26.0 + (14.0 + 160.0) }

@@ -1,16 +1,18 @@
 //! Lights as shaders read them.
 
 use afterlight_graph::gpu::{self, vk};
-use afterlight_scene::{Light, LightKind};
+use afterlight_scene::{Aabb, Light, LightKind};
 use afterlight_shader::structs::LightData;
+use glam::Vec3;
 
 use crate::scene_gpu::record_image;
 
-/// Lights on the device: those without an end first, so that techniques with light volumes can tell them apart.
+/// Lights on the device: those without an end first, so that techniques with light volumes can tell them apart, the others along
+/// a curve that keeps neighbours together (`light_bvh/`).
 pub struct LightList {
     /// Four texels a light.
     pub(crate) data: gpu::Image,
-    /// Centre and range of each light, one texel, what culling reads.
+    /// Centre and radius of the least sphere around what each light reaches, one texel, what culling reads.
     pub(crate) spheres: gpu::Image,
     /// Number of lights.
     pub count: u32,
@@ -23,7 +25,7 @@ pub struct LightList {
 }
 
 impl LightList {
-    /// Uploads lights, in a stable order: unbounded ones first.
+    /// Uploads lights in [`device_order`].
     ///
     /// # Errors
     /// Of the device.
@@ -32,19 +34,9 @@ impl LightList {
         uploader: &mut gpu::Uploader,
         lights: &[Light],
     ) -> Result<Self, gpu::GpuError> {
-        let mut lights = lights.to_vec();
-        lights.sort_by_key(|light| !is_unbounded(light));
+        let lights = device_order(lights);
         let data: Vec<LightData> = lights.iter().map(light_data).collect();
-        let spheres: Vec<[f32; 4]> = lights
-            .iter()
-            .map(|l| {
-                if is_unbounded(l) {
-                    [0.0, 0.0, 0.0, f32::INFINITY]
-                } else {
-                    l.position_ws.extend(l.range_m).into()
-                }
-            })
-            .collect();
+        let spheres: Vec<[f32; 4]> = lights.iter().map(bounding_sphere).collect();
         Ok(Self {
             data: record_image(device, uploader, "lights", &data, 4, vk::Format::R32G32B32A32_UINT)?,
             spheres: record_image(
@@ -62,14 +54,76 @@ impl LightList {
         })
     }
 
+    /// Number of lights with an end.
+    pub fn bounded_count(&self) -> u32 {
+        self.count - self.unbounded_count
+    }
+
     /// Number of a light in the order of the device, the first of equals; 0 where it is not there.
     pub(crate) fn index_of(&self, light: &Light) -> u32 {
         self.lights.iter().position(|one| one == light).unwrap_or_default() as u32
     }
 }
 
+/// Lights in the order in which the device holds and visits them: those without an end first, the others along a Morton curve through
+/// their places, so that 32 in a row are neighbours. Stable: what is in order stays.
+pub fn device_order(lights: &[Light]) -> Vec<Light> {
+    let mut bounds_ws = Aabb::EMPTY;
+    lights.iter().filter(|l| !is_unbounded(l)).for_each(|l| bounds_ws.extend(l.position_ws));
+    let mut lights = lights.to_vec();
+    lights.sort_by_cached_key(|light| match is_unbounded(light) {
+        true => (0, 0),
+        false => (1, morton_code(&bounds_ws, light.position_ws)),
+    });
+    lights
+}
+
+/// Place of a point along the Morton curve through a box: 21 bits an axis, interleaved, steps of one length along all axes.
+fn morton_code(bounds_ws: &Aabb, point_ws: Vec3) -> u64 {
+    const STEPS: f32 = (1 << 21) as f32;
+    let step_m = (bounds_ws.size().max_element() / STEPS).max(f32::MIN_POSITIVE);
+    let at = ((point_ws - bounds_ws.min) / step_m).clamp(Vec3::ZERO, Vec3::splat(STEPS - 1.0));
+    [at.x, at.y, at.z].iter().enumerate().fold(0, |code, (axis, at)| code | spread(*at as u64) << axis)
+}
+
+/// Bits 0 to 20 to every third bit.
+fn spread(bits: u64) -> u64 {
+    [
+        (32, 0x1f_0000_0000_ffff),
+        (16, 0x1f_0000_ff00_00ff),
+        (8, 0x100f_00f0_0f00_f00f),
+        (4, 0x10c3_0c30_c30c_30c3),
+    ]
+    .into_iter()
+    .chain([(2, 0x1249_2492_4924_9249)])
+    .fold(bits, |bits, (by, mask)| (bits | bits << by) & mask)
+}
+
 fn is_unbounded(light: &Light) -> bool {
     light.kind == LightKind::Directional || !light.range_m.is_finite()
+}
+
+/// Centre, world space, and radius, m, of the least sphere around what a light reaches: infinite where it has no end; around the
+/// cone of a spot light of less than a right angle from its axis, whose corners are its place and the rim of its cap.
+fn bounding_sphere(light: &Light) -> [f32; 4] {
+    if is_unbounded(light) {
+        return [0.0, 0.0, 0.0, f32::INFINITY];
+    }
+    let around = |offset_m: f32, radius_m: f32| {
+        (light.position_ws + light.direction_ws * offset_m).extend(radius_m).into()
+    };
+    match light.kind {
+        LightKind::Spot { outer_angle_rad, .. } if outer_angle_rad < std::f32::consts::FRAC_PI_4 => {
+            // Through the apex and the rim, and the cap's pole is inside; room for the rounding of directions.
+            let radius_m = 0.5 * light.range_m / outer_angle_rad.cos();
+            around(radius_m, radius_m * 1.0001)
+        }
+        LightKind::Spot { outer_angle_rad, .. } if outer_angle_rad < std::f32::consts::FRAC_PI_2 => {
+            let (sin, cos) = outer_angle_rad.sin_cos();
+            around(light.range_m * cos, light.range_m * sin * 1.0001)
+        }
+        _ => around(0.0, light.range_m),
+    }
 }
 
 fn light_data(light: &Light) -> LightData {
@@ -92,5 +146,51 @@ fn light_data(light: &Light) -> LightData {
         spot_scale,
         spot_offset,
         _padding: [0; 2],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn spot(outer_angle_rad: f32) -> Light {
+        Light {
+            kind: LightKind::Spot { inner_angle_rad: 0.0, outer_angle_rad },
+            position_ws: Vec3::new(1.0, 2.0, 3.0),
+            direction_ws: Vec3::new(2.0, -1.0, 2.0) / 3.0,
+            intensity: Vec3::ONE,
+            range_m: 5.0,
+        }
+    }
+
+    #[test]
+    fn spheres_hold_what_spot_lights_reach() {
+        for outer_angle_rad in [0.01, 0.5, 0.78, 0.79, 1.2, 1.55, 1.6, 3.0] {
+            let light = spot(outer_angle_rad);
+            let [x, y, z, radius_m] = bounding_sphere(&light);
+            assert!(radius_m <= light.range_m * 1.0001, "{outer_angle_rad}: {radius_m}");
+            let side = light.direction_ws.any_orthonormal_vector();
+            for i in 0..=64 {
+                let (sin, cos) = (outer_angle_rad * i as f32 / 64.0).sin_cos();
+                let rim = light.position_ws + (light.direction_ws * cos + side * sin) * light.range_m;
+                for point in [rim, light.position_ws] {
+                    let distance_m = point.distance(Vec3::new(x, y, z));
+                    assert!(distance_m <= radius_m, "{outer_angle_rad}: {distance_m} of {radius_m}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_curve_keeps_neighbours_together() {
+        let bounds = Aabb { min: Vec3::ZERO, max: Vec3::ONE };
+        assert_eq!(morton_code(&bounds, Vec3::ZERO), 0);
+        assert_eq!(morton_code(&bounds, Vec3::ONE), (1 << 63) - 1);
+        assert_eq!(morton_code(&bounds, Vec3::new(0.5, 0.0, 0.0)), 1 << 60);
+        assert_eq!(morton_code(&bounds, Vec3::new(0.0, 0.25, 0.5)), 1 << 58 | 1 << 62);
+        let lights = [spot(0.1), Light { kind: LightKind::Directional, ..spot(0.1) }];
+        let ordered = device_order(&lights);
+        assert_eq!(ordered[0].kind, LightKind::Directional);
+        assert_eq!(device_order(&ordered), ordered);
     }
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::error::TechniqueError;
+use crate::{error::TechniqueError, light_step};
 
 /// What values a parameter takes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -127,9 +127,10 @@ impl Params {
         Ok(())
     }
 
-    /// All parameters that a technique has.
+    /// All parameters that a technique has: those of all, its own, and where it has `lights` those of what lights may be listed for.
     pub fn known(info: &crate::Info) -> impl Iterator<Item = &'static ParamInfo> {
-        COMMON.iter().chain(info.params)
+        let has_step = info.params.iter().any(|p| p.key == light_step::KEY);
+        COMMON.iter().chain(info.params).chain(if has_step { light_step::CELLS } else { &[] })
     }
 
     /// Every parameter of a technique with its value.
@@ -140,6 +141,11 @@ impl Params {
     /// The value of a parameter.
     pub fn get<'a>(&'a self, param: &'a ParamInfo) -> &'a str {
         self.values.get(param.key).map_or(param.default, String::as_str)
+    }
+
+    /// The value of a parameter that counts something; 0 where it is a word.
+    pub fn count(&self, param: &ParamInfo) -> u32 {
+        self.values.get(param.key).map_or(param.default, String::as_str).parse().unwrap_or_default()
     }
 
     /// The value of a parameter that is a number; 0 where it is a word.

@@ -6,7 +6,7 @@ use afterlight_graph::{
     Executor, FrameReport, Graph, ImageHandle, ResourceId,
     gpu::{self, vk},
 };
-use afterlight_scene::{Camera, Environment, Light, Projection, Scene};
+use afterlight_scene::{Aabb, Camera, Environment, Light, Projection, Scene};
 use afterlight_shader::{Shader, structs::FrameConstants};
 use glam::{Mat4, Vec3, Vec4};
 
@@ -167,6 +167,11 @@ impl Renderer {
         &self.settings
     }
 
+    /// Nearest and farthest view distance, m, that a surface of the scene can have in this view: what clusters lie between.
+    pub fn distance_range_m(&self) -> [f32; 2] {
+        View::new(&self.settings).constants(&self.settings, &self.lights, &self.scene).distance_range_m
+    }
+
     /// What of the settings this scene cannot give, a line each.
     pub fn warnings(&self) -> Vec<String> {
         [indirect::warning, shadow::warning]
@@ -214,7 +219,7 @@ impl Renderer {
             usage: vk::BufferUsageFlags::UNIFORM_BUFFER,
             memory: gpu::MemoryKind::Upload,
         })?;
-        constants.write(0, bytemuck::bytes_of(&view.constants(settings, &self.lights)))?;
+        constants.write(0, bytemuck::bytes_of(&view.constants(settings, &self.lights, &self.scene)))?;
 
         let mut capacities = Capacities::default();
         for _ in 1..RECORDINGS_MAX {
@@ -471,9 +476,13 @@ impl View {
         }
     }
 
-    pub fn constants(&self, settings: &Settings, lights: &LightList) -> FrameConstants {
+    pub fn constants(&self, settings: &Settings, lights: &LightList, scene: &SceneGpu) -> FrameConstants {
         // The view looks along -z, so a point's distance is minus the third row of view_from_world.
         let distance_from_world = -self.view_from_world.row(2);
+        let near_m = match settings.camera.projection {
+            Projection::Perspective { near_m, .. } | Projection::Orthographic { near_m, .. } => near_m,
+        };
+        let bounds_ws = scene.bounds_ws(settings.displacement_m);
         let to_eye = self.view_from_world.row(2).truncate();
         let (depth_to_distance, eye) = match settings.camera.projection {
             Projection::Perspective { near_m, .. } => {
@@ -495,8 +504,23 @@ impl View {
             light_count: lights.count,
             background_radiance: settings.environment.background_radiance.into(),
             unbounded_light_count: lights.unbounded_count,
+            distance_range_m: distance_range_m(&bounds_ws, distance_from_world, near_m),
         }
     }
+}
+
+/// Nearest and farthest view distance, m, of what lies in a box and behind the near plane, with room for rounding. The nearest is
+/// at least this share of the farthest: slices at equal ratios would else be spent on what nobody sees.
+fn distance_range_m(bounds_ws: &Aabb, distance_from_world: Vec4, near_m: f32) -> [f32; 2] {
+    const LEAST_SHARE: f32 = 1e-4;
+    if bounds_ws.is_empty() {
+        return [1.0, 2.0];
+    }
+    let center_m = distance_from_world.dot(bounds_ws.center().extend(1.0));
+    let half_m = 0.5 * distance_from_world.truncate().abs().dot(bounds_ws.size());
+    let farthest_m = (1.001 * (center_m + half_m)).max(f32::MIN_POSITIVE * 1e8);
+    let nearest_m = (0.999 * (center_m - half_m)).max(0.999 * near_m).max(LEAST_SHARE * farthest_m);
+    [nearest_m, farthest_m.max(2.0 * nearest_m)]
 }
 
 /// Inverse, computed in 64 bits: positions are reconstructed through it.

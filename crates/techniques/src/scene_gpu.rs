@@ -149,6 +149,12 @@ impl SceneGpu {
         self.bucket_first[BUCKETS] > self.bucket_first[BUCKETS / 2]
     }
 
+    /// Box of all surfaces in world space, which displacement moves along each axis at most as far as said, m.
+    pub(crate) fn bounds_ws(&self, displacement_m: f32) -> Aabb {
+        let bounds = self.draw_infos.iter().fold(Aabb::EMPTY, |bounds, draw| bounds.union(&draw.bounds_ws));
+        Aabb { min: bounds.min - displacement_m, max: bounds.max + displacement_m }
+    }
+
     /// Number of draws: pieces of at most 1,024 triangles.
     pub fn draw_count(&self) -> usize {
         self.draw_infos.len()

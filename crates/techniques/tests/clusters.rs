@@ -6,14 +6,14 @@ use std::collections::BTreeSet;
 
 use afterlight_image::Rgba8Image;
 use afterlight_oracle::{
-    clusters::{ClusterView, slice_begins_m},
-    tiles::light_reaches,
+    clusters::{Cell, ClusterView, slice_begins_m},
+    tiles::{Decision, light_reaches},
 };
 use afterlight_techniques::{
-    Frame, Info, Params, Prepared, Settings, Technique, TechniqueError,
-    clusters::{self, Grid},
+    Frame, Info, Params, Prepared, Renderer, Settings, Technique, TechniqueError,
+    clusters::{self, Division, Grid, Surfaces},
     cost::{Cost, Workload},
-    find, gbuffer,
+    device_order, find, gbuffer,
     graph::{Graph, ImageHandle, gpu::vk},
     scene::{Camera, Light, LightKind, Projection, Scene},
     shader::Shader,
@@ -22,7 +22,7 @@ use common::{Stage, compiled_with_header, image_of, params, psnr, sources, wider
 use glam::{DVec4, Vec3};
 
 /// The lists of `clustered` with everything kept.
-struct Lists(Grid);
+struct Lists(Division);
 
 impl Technique for Lists {
     fn info(&self) -> &Info {
@@ -34,8 +34,9 @@ impl Technique for Lists {
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let filled = gbuffer::fill(graph, frame, "clustered", vk::Format::D32_SFLOAT)?;
         graph.keep(&filled.depth);
-        let lists = clusters::build(graph, frame, "clustered", self.0, &filled.depth)?;
-        for buffer in [&lists.slices, &lists.kept, &lists.begins, &lists.lists] {
+        let surfaces = Surfaces::of_depth(&filled.depth, 1);
+        let lists = clusters::build(graph, frame, "clustered", self.0, &surfaces)?;
+        for buffer in [&lists.cells, &lists.ends, &lists.lists] {
             graph.keep(buffer);
         }
         Ok(filled.accumulation)
@@ -44,7 +45,7 @@ impl Technique for Lists {
 
 /// A shader of `folder/file` with text replaced in a header of the stage.
 fn mutant(name: &str, header: &str, from: &str, to: &str) -> Shader {
-    compiled_with_header(name, (&sources(), &format!("clusters/{header}")), &[(from, to)])
+    compiled_with_header(name, (&sources(), header), &[(from, to)])
 }
 
 fn prepare(stage: &Stage, technique: &dyn Technique, settings: &Settings, shaders: &[Shader]) -> Prepared {
@@ -58,15 +59,32 @@ fn words(prepared: &mut Prepared, name: &str) -> Vec<u32> {
 
 /// What the device left of a frame.
 struct Found {
-    /// View distance of every pixel that shows a surface, m, by the device's arithmetic.
-    pixels: Vec<([u32; 2], f32, f32)>,
+    view: ClusterView,
+    division: Division,
+    /// View distances at which slices begin and the last ends, m.
     begins_m: Vec<f64>,
-    kept: Vec<u32>,
+    /// Depth, and view distance in m, of every pixel that shows a surface, by the device's arithmetic.
+    pixels: Vec<([u32; 2], f32, f32)>,
+    /// Number and space of each cell.
+    cells: Vec<(u32, Cell)>,
+    /// Lights of each cell.
     lists: Vec<Vec<u32>>,
 }
 
-fn found(stage: &Stage, settings: &Settings, grid: Grid, shaders: &[Shader]) -> Found {
-    let mut prepared = prepare(stage, &Lists(grid), settings, shaders);
+/// Slices of a tile, and whether they end at equal ratios.
+fn slices(division: Division) -> (u32, bool) {
+    match division {
+        Division::Clusters(grid) => (grid.slices, grid.logarithmic),
+        _ => (1, false),
+    }
+}
+
+fn tile_px(division: Division) -> u32 {
+    division.most_pixels().sqrt() as u32
+}
+
+fn found(stage: &Stage, settings: &Settings, division: Division, shaders: &[Shader]) -> Found {
+    let mut prepared = prepare(stage, &Lists(division), settings, shaders);
     prepared.run().unwrap();
     let Projection::Perspective { near_m, .. } = settings.camera.projection else { panic!("perspective") };
     let depth = prepared.executor().read_image("clustered/depth").unwrap();
@@ -75,60 +93,79 @@ fn found(stage: &Stage, settings: &Settings, grid: Grid, shaders: &[Shader]) -> 
     let counters = prepared.counters().unwrap();
     assert!(counters.iter().all(|c| c.dropped == 0 && c.needed <= c.capacity), "{counters:?}");
     let needed = |name: &str| counters.iter().find(|c| c.name == name).expect("a counter").needed as usize;
-    let begins = words(&mut prepared, "clustered/list begins");
-    let lists = words(&mut prepared, "clustered/cluster lists");
-    let kept = words(&mut prepared, "clustered/kept clusters")[..needed("clusters")].to_vec();
-    assert_eq!(begins[kept.len()] as usize, needed("cluster lights"));
-    let slices = words(&mut prepared, "clustered/cluster slices");
-    Found {
+    let ends = words(&mut prepared, "clustered/list ends");
+    let lists = words(&mut prepared, "clustered/cell lists");
+    let cells = words(&mut prepared, "clustered/cells");
+    let renderer = Renderer::with_scene(&stage.device, stage.uploaded.clone(), settings).unwrap();
+    let (slices, logarithmic) = slices(division);
+    let cell = |w: &[u32]| {
+        let range_m = [w[1], w[2]].map(|bits| f64::from(f32::from_bits(bits)));
+        (w[0], Cell { tile: w[0] / slices, range_m, steps: w[3] })
+    };
+    let found = Found {
+        view: ClusterView::new(&settings.camera, [settings.width_px, settings.height_px], tile_px(division)),
+        division,
+        begins_m: slice_begins_m(renderer.distance_range_m().map(f64::from), slices, logarithmic),
         pixels: depth.filter(|(_, d)| *d > 0.0).map(|(i, d)| (at(i), d, near_m / d)).collect(),
-        begins_m: slices.iter().map(|bits| f64::from(f32::from_bits(*bits))).collect(),
-        lists: (0..kept.len()).map(|i| lists[begins[i] as usize..begins[i + 1] as usize].to_vec()).collect(),
-        kept,
-    }
+        cells: cells.chunks_exact(4).take(needed("clusters")).map(cell).collect(),
+        lists: ends
+            .chunks_exact(2)
+            .take(needed("clusters"))
+            .map(|end| lists[end[0] as usize..end[1] as usize].to_vec())
+            .collect(),
+    };
+    let entries: usize = found.lists.iter().map(Vec::len).sum();
+    assert_eq!(entries, needed("cluster lights"), "lists overlap, or leave room between them");
+    found
 }
 
 impl Found {
-    fn view(&self, settings: &Settings, grid: Grid) -> ClusterView {
-        let size_px = [settings.width_px, settings.height_px];
-        ClusterView::new(&settings.camera, size_px, grid.cluster_px, self.begins_m.clone())
-    }
-
-    /// Clusters of each pixel, two where rounding may take the next.
-    fn clusters_of(view: &ClusterView, pixel: [u32; 2], distance_m: f32) -> [u32; 2] {
-        [1.0 - 1e-6, 1.0 + 1e-6].map(|scale| view.cluster(pixel, scale * f64::from(distance_m)))
+    /// Numbers of the cells that hold a pixel, two where rounding may take the next.
+    fn cells_of(&self, pixel: [u32; 2], distance_m: f32) -> [u32; 2] {
+        let slices = slices(self.division).0;
+        let inner = &self.begins_m[1..slices as usize];
+        [1.0 - 1e-4, 1.0 + 1e-4].map(|scale| {
+            let slice = inner.iter().filter(|begin_m| **begin_m <= scale * f64::from(distance_m)).count();
+            self.view.tile(pixel) * slices + slice as u32
+        })
     }
 
     /// Decisions that differ from the twin's for the same lights, rounding left out.
-    fn different(&self, view: &ClusterView, settings: &Settings) -> usize {
-        let unlike = |(cluster, list): (&u32, &Vec<u32>)| {
+    fn different(&self, lights: &[Light]) -> usize {
+        let unlike = |((_, cell), list): (&(u32, Cell), &Vec<u32>)| {
             assert!(list.is_sorted_by(|a, b| a < b), "{list:?}");
-            let decisions = view.cull(*cluster, &settings.lights);
-            let differs = |(light, decision): (usize, &afterlight_oracle::tiles::Decision)| {
+            let decisions = self.view.cull(cell, lights);
+            let differs = |(light, decision): (usize, &Decision)| {
+                let unbounded = decision.slack_m == f64::INFINITY;
+                let listed = list.binary_search(&(light as u32)).is_ok();
                 // 32-bit arithmetic on coordinates of tens of metres is right to about 1e-5 m.
-                decision.slack_m.abs() >= 1e-4
-                    && decision.passes != list.binary_search(&(light as u32)).is_ok()
+                if unbounded { listed } else { decision.slack_m.abs() >= 1e-3 && decision.passes != listed }
             };
             decisions.iter().enumerate().filter(|one| differs(*one)).count()
         };
-        self.kept.iter().zip(&self.lists).map(unlike).sum()
+        self.cells.iter().zip(&self.lists).map(unlike).sum()
     }
 
-    /// Pairs of a pixel and a light: on the pixel's list, reached, reached and not on the list.
-    fn pairs(&self, view: &ClusterView, settings: &Settings) -> [usize; 3] {
-        let world_from_clip = view.clip_from_world().inverse();
+    /// Pairs of a pixel and a light with an end: on the list of the pixel's cell, reached, reached and not on the list.
+    fn pairs(&self, lights: &[Light]) -> [usize; 3] {
+        let world_from_clip = self.view.clip_from_world().inverse();
+        let places: std::collections::BTreeMap<u32, usize> =
+            self.cells.iter().enumerate().map(|(place, (number, _))| (*number, place)).collect();
         let mut pairs = [0; 3];
         for (pixel, depth, distance_m) in &self.pixels {
-            let [low, high] = Self::clusters_of(view, *pixel, *distance_m);
-            let list = self.kept.binary_search(&low).map_or(&[][..], |place| &self.lists[place][..]);
-            let [x, y] = [0, 1].map(|i| (f64::from(pixel[i]) + 0.5) * 2.0 / f64::from(view.size_px[i]) - 1.0);
+            let [low, high] = self.cells_of(*pixel, *distance_m);
+            let list = places.get(&low).map_or(&[][..], |place| &self.lists[*place][..]);
+            let [x, y] =
+                [0, 1].map(|i| (f64::from(pixel[i]) + 0.5) * 2.0 / f64::from(self.view.size_px[i]) - 1.0);
             let p = world_from_clip * DVec4::new(x, y, f64::from(*depth), 1.0);
             let point_ws = p.truncate() / p.w;
             pairs[0] += list.len();
-            for (l, light) in settings.lights.iter().enumerate() {
+            for (l, light) in lights.iter().enumerate() {
                 // within rounding of the range nothing arrives
-                let near =
-                    point_ws.distance(light.position_ws.as_dvec3()) < f64::from(light.range_m) * 0.9999;
+                let distance_m = point_ws.distance(light.position_ws.as_dvec3());
+                let near = light.range_m.is_finite()
+                    && light.kind != LightKind::Directional
+                    && distance_m < f64::from(light.range_m) * 0.9999;
                 let reached = near && light_reaches(light, point_ws);
                 pairs[1] += usize::from(reached);
                 let missed = low == high && list.binary_search(&(l as u32)).is_err();
@@ -137,86 +174,190 @@ impl Found {
         }
         pairs
     }
+
+    /// Checks that the cells are those that hold a surface, each once, and lie where the twin has them.
+    fn check_cells(&self) {
+        let (mut sure, mut possible) = (BTreeSet::new(), BTreeSet::new());
+        for (pixel, _, distance_m) in &self.pixels {
+            let [low, high] = self.cells_of(*pixel, *distance_m);
+            possible.extend([low, high]);
+            if low == high {
+                sure.insert(low);
+            }
+        }
+        let kept: BTreeSet<u32> = self.cells.iter().map(|(number, _)| *number).collect();
+        assert_eq!(kept.len(), self.cells.len(), "a cell stands twice");
+        assert!(sure.is_subset(&kept) && kept.is_subset(&possible), "{:?}: cells kept", self.division);
+        for (number, cell) in &self.cells {
+            let ends_m = match self.division {
+                Division::Clusters(grid) => {
+                    let slice = (number % grid.slices) as usize;
+                    [self.begins_m[slice], self.begins_m[slice + 1]]
+                }
+                _ => self.tile_range_m(*number),
+            };
+            // Farther out by the slack of 2e-4, and rounding.
+            for (found, expected, side) in
+                [(cell.range_m[0], ends_m[0], 1.0), (cell.range_m[1], ends_m[1], -1.0)]
+            {
+                let outwards = side * (1.0 - found / expected);
+                assert!((0.5e-4..3e-4).contains(&outwards), "{number}: {found} m, expected {expected}");
+            }
+            self.check_steps(*number, cell);
+        }
+    }
+
+    /// Nearest and farthest view distance of a tile's pixels, m.
+    fn tile_range_m(&self, tile: u32) -> [f64; 2] {
+        let of_tile = self.pixels.iter().filter(|(pixel, _, _)| self.view.tile(*pixel) == tile);
+        of_tile
+            .fold([f64::MAX, 0.0], |[low, high], (_, _, d)| [low.min(f64::from(*d)), high.max(f64::from(*d))])
+    }
+
+    /// Checks that a tile's steps are those that hold a surface.
+    fn check_steps(&self, tile: u32, cell: &Cell) {
+        if !matches!(self.division, Division::Tiles25d { .. }) {
+            assert_eq!(cell.steps, u32::MAX);
+            return;
+        }
+        let [near_m, far_m] = cell.range_m;
+        let (mut sure, mut possible) = (0u32, 0u32);
+        for (_, _, distance_m) in self.pixels.iter().filter(|(pixel, _, _)| self.view.tile(*pixel) == tile) {
+            let bit = |offset: f64| {
+                let step = (f64::from(*distance_m) - near_m) / (far_m - near_m) * 32.0 + offset;
+                1 << (step.clamp(0.0, 31.0) as u32)
+            };
+            let [low, high] = [bit(-1e-2), bit(1e-2)];
+            possible |= low | high;
+            sure |= if low == high { low } else { 0 };
+        }
+        assert_eq!(
+            sure & !cell.steps,
+            0,
+            "tile {tile}: steps {:032b}, there must be {sure:032b}",
+            cell.steps
+        );
+        assert_eq!(cell.steps & !possible, 0, "tile {tile}: steps {:032b} of {possible:032b}", cell.steps);
+    }
 }
 
-const GRIDS: [Grid; 3] = [
-    Grid { cluster_px: 32, slices: 32, logarithmic: true },
-    Grid { cluster_px: 17, slices: 7, logarithmic: false },
-    Grid { cluster_px: 16, slices: 1, logarithmic: false },
+const fn grid(cluster_px: u32, slices: u32, logarithmic: bool) -> Division {
+    Division::Clusters(Grid { cluster_px, slices, logarithmic })
+}
+
+const DIVISIONS: [Division; 6] = [
+    grid(32, 32, true),
+    grid(17, 7, false),
+    grid(8, 256, true),
+    grid(64, 1, false),
+    Division::Tiles { tile_px: 16 },
+    Division::Tiles25d { tile_px: 16 },
 ];
+
+/// Settings whose lights are in the order of the device.
+fn ordered(settings: Settings) -> Settings {
+    Settings { lights: device_order(&settings.lights), ..settings }
+}
 
 #[test]
 fn lists_are_those_of_the_cpu_twin_and_miss_no_light() {
     let gpu = afterlight_testkit::gpu();
     let stage = Stage::new(&gpu, "builtin:colonnade?triangles=20000");
     for (size, count) in [((160, 90), 100), ((113, 61), 1500)] {
-        let settings = stage.settings(size, count);
-        for grid in GRIDS {
-            let found = found(&stage, &settings, grid, &[]);
-            let view = found.view(&settings, grid);
-
-            let range_m = [found.begins_m[0], found.begins_m[grid.slices as usize]];
-            let distances = || found.pixels.iter().map(|(_, _, distance_m)| *distance_m);
-            let ends = [distances().fold(f32::MAX, f32::min), distances().fold(0.0, f32::max)];
-            for (found, expected) in range_m.iter().zip(ends) {
-                assert!((found / f64::from(expected) - 1.0).abs() < 1e-6, "{found}, expected {expected}");
-            }
-            let expected = slice_begins_m(range_m, grid.slices, grid.logarithmic);
-            for (found, expected) in found.begins_m.iter().zip(&expected) {
-                assert!((found / expected - 1.0).abs() < 1e-5, "{found}, expected {expected}");
-            }
-
-            let (mut sure, mut possible) = (BTreeSet::new(), BTreeSet::new());
-            for (pixel, _, distance_m) in &found.pixels {
-                let [low, high] = Found::clusters_of(&view, *pixel, *distance_m);
-                possible.extend([low, high]);
-                if low == high {
-                    sure.insert(low);
-                }
-            }
-            let kept: BTreeSet<u32> = found.kept.iter().copied().collect();
-            assert!(found.kept.is_sorted_by(|a, b| a < b));
-            assert!(sure.is_subset(&kept) && kept.is_subset(&possible), "{grid:?}: clusters kept");
-
-            assert_eq!(found.different(&view, &settings), 0, "{grid:?}");
-            let larger = Settings { lights: wider(&settings.lights, 1.02), ..settings.clone() };
-            assert!(found.different(&view, &larger) > 0, "ranges larger by two percent go unseen");
-            let [listed, reached, missed] = found.pairs(&view, &settings);
+        let settings = ordered(stage.settings(size, count));
+        for division in DIVISIONS {
+            let found = found(&stage, &settings, division, &[]);
+            found.check_cells();
+            assert_eq!(found.different(&settings.lights), 0, "{division:?}");
+            let larger = wider(&settings.lights, 1.02);
+            assert!(found.different(&larger) > 0, "ranges larger by two percent go unseen");
+            let [listed, reached, missed] = found.pairs(&settings.lights);
             let excess = listed as f64 / reached as f64;
             println!(
-                "{size:?}, {count} lights, {grid:?}: {} clusters, {listed} pairs listed, {reached} reached: {excess:.2}",
-                kept.len()
+                "{size:?}, {count} lights, {division:?}: {} cells, {listed} pairs listed, {reached} reached: {excess:.2}",
+                found.cells.len()
             );
-            assert_eq!(missed, 0, "{grid:?}: pairs missed");
+            assert_eq!(missed, 0, "{division:?}: pairs missed");
             assert!(reached > 10_000, "the view shows {reached} pairs");
         }
     }
+}
+
+/// Lights of all kinds all over a scene.
+fn lights_of_all_kinds(stage: &Stage, seed: u64, count: u32) -> Vec<Light> {
+    let points = afterlight_techniques::scene::lights::seeded_lights(&stage.scene.bounds_ws(), count, seed);
+    let turned = |(i, light): (usize, Light)| {
+        let direction_ws = Vec3::new(light.intensity.x, light.intensity.y, light.intensity.z)
+            - Vec3::splat(light.intensity.element_sum() / 3.0);
+        let direction_ws = direction_ws.try_normalize().unwrap_or(Vec3::NEG_Y);
+        let outer_angle_rad = 0.05 + 0.03 * (i % 60) as f32;
+        let kind = match i % 8 {
+            0..3 => LightKind::Point,
+            7 if i % 16 == 7 => LightKind::Directional,
+            _ => LightKind::Spot { inner_angle_rad: 0.5 * outer_angle_rad, outer_angle_rad },
+        };
+        let range_m = if kind == LightKind::Point { light.range_m } else { 2.0 * light.range_m };
+        Light { kind, direction_ws, range_m, ..light }
+    };
+    device_order(&points.into_iter().enumerate().map(turned).collect::<Vec<_>>())
+}
+
+/// 10⁵ cells of random views, lights of all kinds.
+#[test]
+fn no_light_is_missed_in_a_hundred_thousand_cells() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=17000&texture=16");
+    let bounds = stage.scene.bounds_ws();
+    let at = |i: u32, k: u32| {
+        // points of a sequence with low discrepancy in the box
+        let share = |base: f64| ((f64::from(i) + 0.5) * base + 0.37 * f64::from(k)).fract() as f32;
+        bounds.min + bounds.size() * Vec3::new(share(0.754_877), share(0.569_840), share(0.618_034))
+    };
+    let (mut cells, mut reached) = (0, 0);
+    let mut view = 0;
+    while cells < 100_000 {
+        let camera = Camera::look_at("view", at(view, 0), at(view, 1), 1.0 + 0.01 * (view % 50) as f32, 0.05);
+        let mut settings = stage.from(camera, (320, 180), 0);
+        settings.lights = lights_of_all_kinds(&stage, u64::from(view), 90);
+        let division = match view % 8 {
+            7 => DIVISIONS[4 + (view / 8 % 2) as usize],
+            slices => grid(8, 64 + 24 * slices, slices % 2 == 0),
+        };
+        let found = found(&stage, &settings, division, &[]);
+        let [_, of_view, missed] = found.pairs(&settings.lights);
+        assert_eq!(missed, 0, "view {view}, {division:?}");
+        assert_eq!(found.different(&settings.lights), 0, "view {view}, {division:?}");
+        (cells, reached, view) = (cells + found.cells.len(), reached + of_view, view + 1);
+        assert!(view < 400, "{cells} cells in {view} views");
+    }
+    println!("{cells} cells of {view} views, {reached} pairs reached");
+    assert!(reached > 1_000_000);
 }
 
 #[test]
 fn tests_that_are_too_tight_are_caught() {
     let gpu = afterlight_testkit::gpu();
     let stage = Stage::new(&gpu, "builtin:colonnade?triangles=20000");
-    let settings = stage.settings((160, 90), 300);
+    let mut settings = stage.settings((160, 90), 0);
+    settings.lights = lights_of_all_kinds(&stage, 1, 300);
+    let bounds = "clusters/bounds.glsl";
+    let (clusters, tiles25) = (DIVISIONS[0], DIVISIONS[5]);
     let mutants = [
-        ("cull.glsl", "float range_m = sphere.w;", "float range_m = 0.95 * sphere.w;"),
-        ("cull.glsl", "slice_begins_m[slice + end]", "slice_begins_m[slice]"),
-        ("cull.glsl", "slice_begins_m[slice + end]", "slice_begins_m[min(slice + 1u, SLICES - 1u) + end]"),
-        (
-            "cull.glsl",
-            "min(first + CLUSTER_PX, frame.size_px)",
-            "min(first + CLUSTER_PX / 2u, frame.size_px)",
-        ),
+        (clusters, bounds, "float range_m = sphere.w;", "float range_m = 0.95 * sphere.w;"),
+        (clusters, bounds, "end == 0u ? cell.nearest_m : cell.farthest_m", "cell.nearest_m"),
+        (clusters, bounds, "min(first + LIGHT_TILE_PX, frame.size_px)", "first + LIGHT_TILE_PX / 2u"),
+        (clusters, bounds, "outside_m <= b.sphere.w", "outside_m <= -0.7 * b.sphere.w"),
+        (clusters, bounds, "lessThanEqual(box.low, b.high_ws)", "lessThanEqual(box.low, b.low_ws)"),
+        (clusters, "light_bvh/tree.glsl", "+ (1u << shift) - 1u) >> shift", ") >> shift"),
+        (tiles25, bounds, "(0xffffffffu >> (31u - last))", "(0x7fffffffu >> (31u - last))"),
     ];
-    for (header, from, to) in mutants {
-        let shaders =
-            ["clusters/count.comp", "clusters/fill.comp"].map(|name| mutant(name, header, from, to));
-        let found = found(&stage, &settings, GRIDS[0], &shaders);
-        let view = found.view(&settings, GRIDS[0]);
-        let [_, reached, missed] = found.pairs(&view, &settings);
+    for (division, header, from, to) in mutants {
+        let shader = mutant("clusters/assign.comp", header, from, to);
+        let found = found(&stage, &settings, division, &[shader]);
+        let [_, reached, missed] = found.pairs(&settings.lights);
         println!("{to}: {missed} of {reached} pairs missed");
         assert!(missed > 0, "{to} goes unseen");
-        assert!(found.different(&view, &settings) > 0, "{to}: the twin agrees");
+        assert!(found.different(&settings.lights) > 0, "{to}: the twin agrees");
     }
 }
 
@@ -224,21 +365,20 @@ fn image_with(stage: &Stage, id: &str, settings: &Settings, shaders: &[Shader]) 
     image_of(&mut prepare(stage, find(id).unwrap(), settings, shaders))
 }
 
-/// A surface that asks the list of the next slice.
+/// A surface that asks the list of another cluster.
 #[test]
-fn the_next_slice_is_caught() {
+fn the_next_cluster_is_caught() {
     let gpu = afterlight_testkit::gpu();
     let stage = Stage::new(&gpu, "builtin:colonnade?triangles=20000");
     let settings = stage.settings((160, 90), 100);
     let reference = stage.image(find("forward").unwrap(), &settings);
-    let wrong =
-        mutant("clustered/shade.comp", "grid.glsl", "return low;", "return min(low + 1u, SLICES - 1u);");
+    let wrong = mutant("gbuffer/shade.comp", "clusters/lists.glsl", "word.x & (bit - 1u)", "word.x & bit");
     let db = psnr(&reference, &image_with(&stage, "clustered", &settings, &[wrong]));
-    println!("the next slice: {db:.2} dB");
+    println!("the next cluster: {db:.2} dB");
     assert!(db < 45.0, "a mutant within the bound: {db:.2} dB");
 }
 
-const TECHNIQUES: [&str; 3] = ["clustered", "clustered-forward", "tiled-forward"];
+const TECHNIQUES: [&str; 4] = ["clustered", "clustered-forward", "tiled-forward", "forward-plus"];
 
 fn agree(stage: &Stage, settings: &Settings, what: &str) {
     let reference = stage.image(find("forward").unwrap(), settings);
@@ -272,7 +412,7 @@ fn ten_thousand_lights_on_sponza() {
     }
 }
 
-/// Lights without an end are on no list; spot lights are listed by their spheres. An empty scene has no cluster.
+/// Lights without an end are on no list. An empty scene has no cluster.
 #[test]
 fn lights_of_all_kinds_and_no_surface() {
     let gpu = afterlight_testkit::gpu();

@@ -95,7 +95,7 @@ fn lists_hold_what_is_within_range() {
         assert!(off(counters[0].needed) < 0.002, "{id}: {} nodes, {expected} by rays", counters[0].needed);
 
         // Lights whose volume lies behind the surface.
-        let loose = mutant("dot(to_light, to_light) <= sphere.w * sphere.w", "sphere.w > 0.0");
+        let loose = mutant("dot(to_light, to_light) <= reach_m * reach_m", "sphere.w > 0.0");
         let (_, more) = rendered(&stage, technique, &settings, &[], Some(&loose));
         assert!(off(more[0].needed) > 0.02, "{id}: a mutant within the bound: {} nodes", more[0].needed);
 
@@ -130,7 +130,7 @@ fn a_bound_on_nodes_is_told() {
         let (all, counters) = rendered(&stage, technique, &settings, &[], None);
         let needed = counters[0].needed;
         for nodes in [0, needed / 2, needed - 1, needed] {
-            let sets = [("nodes", &*nodes.to_string())];
+            let sets = [("light-nodes", &*nodes.to_string())];
             let (image, counters) = rendered(&stage, technique, &settings, &sets, None);
             let counter = &counters[0];
             let db = psnr(&all, &image);

@@ -30,11 +30,11 @@ fn ways(samples: u32) -> Vec<Way> {
     let way = |sets, full, bound| Way { id: "dais-multirate", sets, full: ("dais", full), bound };
     let mut ways = vec![
         way(&[("visibility", "raster"), ("share", "grid")], RASTER, HALF_RATE_BOUND),
-        way(&[("visibility", "compute"), ("share", "grid"), ("lights", "tiled")], COMPUTE, HALF_RATE_BOUND),
+        way(&[("visibility", "compute"), ("share", "grid"), ("lights", "tiles25")], COMPUTE, HALF_RATE_BOUND),
         way(&[("fill", "cache"), ("share", "grid")], CACHE, HALF_RATE_BOUND),
         way(&[("visibility", "raster"), ("share", "quads")], RASTER, QUADS_BOUND),
         way(&[("visibility", "compute"), ("share", "quads")], COMPUTE, QUADS_BOUND),
-        way(&[("fill", "cache"), ("share", "quads"), ("lights", "tiled")], CACHE, QUADS_BOUND),
+        way(&[("fill", "cache"), ("share", "quads"), ("lights", "tiles25")], CACHE, QUADS_BOUND),
         way(&[("fill", "cache"), ("share", "grid"), ("reference-bits", "8")], CACHE, HALF_RATE_BOUND),
         way(&[("fill", "cache"), ("share", "quads"), ("reference-bits", "8")], CACHE, QUADS_BOUND),
         way(&[("visibility", "raster"), ("rate", "1/4")], RASTER, QUARTER_RATE_BOUND),

@@ -36,7 +36,7 @@ fn variants() -> Vec<(&'static dyn Technique, Params, String)> {
     for technique in registry().iter().copied().filter(|t| t.info().samples.contains(&4)) {
         let info = technique.info();
         let lights: &[&[(&str, &str)]] = match info.params.iter().any(|p| p.key == "lights") {
-            true => &[&[("lights", "all")], &[("lights", "tiled")]],
+            true => &[&[("lights", "all")], &[("lights", "clusters")]],
             false => &[&[]],
         };
         let sets = lights.iter().flat_map(|one| ways(info.id).iter().map(|way| [*one, *way].concat()));

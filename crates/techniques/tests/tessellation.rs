@@ -361,9 +361,9 @@ fn colored() -> Scene {
 /// Ways in which fragments store tessellated triangles: layouts of references, a cache of one lock, lists.
 const WAYS: &[(&str, &[(&str, &str)])] = &[
     ("dais", &[]),
-    ("dais", &[("lights", "tiled"), ("cache-buckets", "1"), ("reference-bits", "8")]),
+    ("dais", &[("lights", "clusters"), ("cache-buckets", "1"), ("reference-bits", "8")]),
     ("dais-list", &[]),
-    ("dais-list", &[("lights", "tiled"), ("cache-buckets", "1")]),
+    ("dais-list", &[("lights", "clusters"), ("cache-buckets", "1")]),
 ];
 
 /// Scenes and views in which tessellated triangles are stored: masked surfaces, attributes that few scenes have, surfaces that the

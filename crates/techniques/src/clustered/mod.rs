@@ -6,9 +6,10 @@ use afterlight_graph::{Graph, ImageHandle, gpu::vk};
 
 use crate::{
     Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError,
-    clusters::{self, Grid},
+    clusters::{self, Division, Grid, Surfaces},
     cost::{Cost, Workload, clustered_deferred},
     gbuffer,
+    light_step::LightStep,
 };
 
 /// The technique.
@@ -45,29 +46,24 @@ static INFO: Info = Info {
     views: &[],
 };
 
+fn division(params: &Params) -> Division {
+    Division::Clusters(Grid::of_params(params))
+}
+
 impl Technique for Clustered {
     fn info(&self) -> &Info {
         &INFO
     }
 
     fn predict(&self, workload: &Workload, params: &Params) -> Cost {
-        clustered_deferred(workload, Grid::of_params(params, &INFO).most_pixels())
+        clustered_deferred(workload, division(params).most_pixels())
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let filled = gbuffer::fill(graph, frame, INFO.id, vk::Format::D32_SFLOAT)?;
-        let grid = Grid::of_params(frame.params, &INFO);
-        let lists = clusters::build(graph, frame, INFO.id, grid, &filled.depth)?;
-
-        let mut pass = frame.compute(graph, "clustered/shade", &frame.shader("clustered/shade.comp")?);
-        gbuffer::bind(&mut pass, &filled);
-        lists.bind(&mut pass);
-        for (constant, value) in lists.constants() {
-            pass.constant(constant, value);
-        }
-        let radiance = pass.write("hdr", filled.accumulation);
-        pass.dispatch(frame.groups(8));
-        pass.finish();
-        Ok(radiance)
+        let surfaces = Surfaces::of_depth(&filled.depth, 1);
+        let lists = clusters::build(graph, frame, INFO.id, division(frame.params), &surfaces)?;
+        drop(surfaces);
+        gbuffer::shade(graph, frame, INFO.id, filled, &LightStep::Cells(lists))
     }
 }

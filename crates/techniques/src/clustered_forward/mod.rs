@@ -2,14 +2,13 @@
 
 // ORDER: 64
 
-use afterlight_graph::{DepthTest, Graph, ImageHandle, Load, gpu::vk};
+use afterlight_graph::{Graph, ImageHandle};
 
 use crate::{
-    Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError,
-    clusters::{self, Grid},
+    ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError,
+    clusters::{self, Division, Grid},
     cost::{Cost, Workload, clustered_forward},
-    depth_prepass::{FIRST_FRAGMENT, draw_depth},
-    geometry::Surfaces,
+    light_step::record_forward,
 };
 
 /// The technique.
@@ -27,7 +26,7 @@ static INFO: Info = Info {
         surface: "nothing (depth)",
         lights: "clusters",
         schedule: "fragment shader",
-        resolve: "one sample",
+        resolve: "average of the hardware's samples",
     },
     appendix_a: AppendixA {
         id: "CF",
@@ -41,10 +40,14 @@ static INFO: Info = Info {
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
     params: clusters::PARAMS,
     needs: &[],
-    samples: &[1],
+    samples: ANY_SAMPLES,
     tessellation: true,
     views: &[],
 };
+
+fn division(params: &Params) -> Division {
+    Division::Clusters(Grid::of_params(params))
+}
 
 impl Technique for ClusteredForward {
     fn info(&self) -> &Info {
@@ -52,39 +55,10 @@ impl Technique for ClusteredForward {
     }
 
     fn predict(&self, workload: &Workload, params: &Params) -> Cost {
-        clustered_forward(workload, Grid::of_params(params, &INFO).most_pixels())
+        clustered_forward(workload, division(params).most_pixels())
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
-        record(graph, frame, INFO.id, Grid::of_params(frame.params, &INFO))
+        record_forward(graph, frame, &INFO, division(frame.params))
     }
-}
-
-/// Declares depth, lists and forward shading of the technique of that name.
-///
-/// # Errors
-/// As [`clusters::build`].
-pub(crate) fn record(
-    graph: &mut Graph,
-    frame: &Frame<'_>,
-    technique: &str,
-    grid: Grid,
-) -> Result<ImageHandle, TechniqueError> {
-    let name = |what: &str| format!("{technique}/{what}");
-    let depth = draw_depth(graph, frame, technique)?;
-    let radiance = graph.image(&name("radiance"), frame.image_info(vk::Format::R16G16B16A16_SFLOAT));
-    let lists = clusters::build(graph, frame, technique, grid, &depth)?;
-    let mut shaded =
-        Surfaces::shaded(frame, "clustered_forward/shade.frag", "clustered_forward/shade.frag#mask")?
-            .depth(DepthTest::EQUAL)
-            .stencil(FIRST_FRAGMENT, 1);
-    shaded.constants.extend(lists.constants().map(|(constant, value)| (constant.to_owned(), value)));
-    let mut pass = graph.raster(&name("shade"));
-    frame.bind_scene(&mut pass);
-    lists.bind(&mut pass);
-    let radiance = pass.color(radiance, Load::Clear(frame.background()));
-    let _depth = pass.stencil(depth, Load::Keep);
-    shaded.draw(frame, &mut pass);
-    pass.finish();
-    Ok(radiance)
 }

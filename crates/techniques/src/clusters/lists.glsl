@@ -1,47 +1,58 @@
-// Light from the lists of clusters. Lights without an end, the first of all, are on no list: every surface visits them. Lights are
-// visited in their order, so that sums do not depend on the schedule.
+// Light by the lists of cells. Lights are visited in their order, so that sums do not depend on the schedule.
 #ifndef AFTERLIGHT_CLUSTER_LISTS
 #define AFTERLIGHT_CLUSTER_LISTS
 #include "clusters/grid.glsl"
+#include "light_bvh/visit.glsl"
 #include "shading.glsl"
 
-// A bit a cluster that holds a surface.
-layout(set = 0, binding = 15, scalar) readonly buffer ClusterBits {
-    uint cluster_bits[];
+layout(set = 0, binding = 32, scalar) readonly buffer Cells {
+    Cell cells[];
 };
-// Kept clusters before each word of bits.
-layout(set = 0, binding = 16, scalar) readonly buffer KeptBefore {
-    uint kept_before[];
+// Of each word of bits: the bits, a slice each, and the number of cells before them. Of tiles without slices: whether there is a cell,
+// and its number.
+layout(set = 0, binding = 33, scalar) readonly buffer CellWords {
+    uvec2 cell_words[];
 };
-// Where the list of each kept cluster begins; that of the next is where it ends.
-layout(set = 0, binding = 17, scalar) readonly buffer ListBegins {
-    uint list_begins[];
+// First and end of the list of each cell.
+layout(set = 0, binding = 34, scalar) readonly buffer ListEnds {
+    uvec2 list_ends[];
 };
-layout(set = 0, binding = 18, scalar) readonly buffer ClusterLists {
-    uint cluster_lists[];
+layout(set = 0, binding = 35, scalar) readonly buffer CellLists {
+    uint cell_lists[];
 };
-layout(constant_id = 11) const uint CLUSTER_CAPACITY = 0u;
-layout(constant_id = 12) const uint LIST_CAPACITY = 0u;
 
-// First and end of the list of a cluster; nothing where the frame had no room for it, which is then recorded again.
-uvec2 list_of(uint cluster) {
-    uint below = cluster_bits[cluster >> 5] & ((1u << (cluster & 31u)) - 1u);
-    uint place = kept_before[cluster >> 5] + uint(bitCount(below));
-    if (place >= CLUSTER_CAPACITY) {
-        return uvec2(0u);
+// Finds the cell of a surface; false where none was found to hold it, or there was no room for the cell.
+bool cell_of(uvec2 pixel, float distance_m, out uint place) {
+    uint tile = tile_of(pixel);
+    if (DIVISION != CLUSTERS) {
+        uvec2 word = cell_words[tile];
+        place = word.y;
+        if (word.x == 0u || place >= CELL_CAPACITY) {
+            return false;
+        }
+        Cell cell = cells[place];
+        return distance_m >= cell.nearest_m && distance_m <= cell.farthest_m &&
+               (cell.steps >> step_of(distance_m, cell.nearest_m, cell.farthest_m) & 1u) != 0u;
     }
-    return min(uvec2(list_begins[place], list_begins[place + 1u]), LIST_CAPACITY);
+    uint slice = slice_of(distance_m);
+    uvec2 word = cell_words[tile * WORDS + slice / 32u];
+    uint bit = 1u << (slice & 31u);
+    place = word.y + uint(bitCount(word.x & (bit - 1u)));
+    bool within = distance_m >= frame.distance_range_m.x && distance_m <= frame.distance_range_m.y;
+    return within && (word.x & bit) != 0u && place < CELL_CAPACITY;
 }
 
-// Radiance of all lights that reach a surface of a pixel at a view distance.
-vec3 clustered_radiance(ShadingPoint p, uvec2 pixel, float distance_m) {
-    vec3 radiance = vec3(0.0);
-    for (uint i = 0u; i < frame.unbounded_light_count; ++i) {
-        radiance += light_radiance(p, i);
+// Radiance of the lights with an end that reach a surface of a pixel at a view distance. A surface that no cell was made for, since
+// it is shaded off the samples that show it, asks the tree over the lights.
+vec3 cell_radiance(ShadingPoint p, uvec2 pixel, float distance_m) {
+    uint place;
+    if (!cell_of(pixel, distance_m, place)) {
+        return tree_radiance(p);
     }
-    uvec2 list = list_of(cluster_of(pixel, distance_m));
+    vec3 radiance = vec3(0.0);
+    uvec2 list = list_ends[place];
     for (uint i = list.x; i < list.y; ++i) {
-        radiance += light_radiance(p, cluster_lists[i]);
+        radiance += light_radiance(p, cell_lists[i]);
     }
     return radiance;
 }

@@ -1,320 +1,335 @@
-//! The stage that gives every part of the view that holds a surface its list of lights (Olsson et al. 2012; Petrescu et al. 2016,
-//! section 4.10).
+//! The stage that gives every part of the view that holds a surface its list of lights (Petrescu et al. 2016, sections 4.8 to 4.10).
 //!
-//! The view is a grid of tiles and slices of view distance; a bit a cluster marks what a depth buffer shows. Marked clusters are
-//! listed, a group each counts the lights that touch it, a scan gives every list its place, and the same groups fill them. No
-//! list has a bound: the room of all is known before it is filled, and a frame that had less is recorded again.
+//! The view is divided into cells: tiles, tiles with 32 bits of depth, or clusters, tiles cut into slices of view distance. A pass finds
+//! the cells that hold a surface; another walks down the tree over the lights (`light_bvh/`) for each of them. No list has a bound:
+//! what is found is counted before it is written, and a frame that had less room is recorded again.
 
 use afterlight_graph::{BufferHandle, ComputePass, Graph, ImageHandle};
 
+use afterlight_shader::Shader;
+
 use crate::{
-    ParamInfo, ParamKind,
+    ParamInfo, ParamKind, Params,
     capacity::FIRST_GUESS,
     error::TechniqueError,
     frame::{Frame, Slots},
+    light_bvh::{self, LightBvh},
 };
 
 /// How the view is divided.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Division {
+    /// Tiles, each from the nearest to the farthest of its surfaces.
+    Tiles {
+        /// Width and height of a tile, pixels.
+        tile_px: u32,
+    },
+    /// The same, and which of 32 equal steps between the two hold a surface (Harada 2012).
+    Tiles25d {
+        /// Width and height of a tile, pixels.
+        tile_px: u32,
+    },
+    /// Tiles cut into slices of view distance.
+    Clusters(Grid),
+}
+
+/// A grid of clusters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Grid {
     /// Width and height of a tile, pixels, at least 1.
     pub cluster_px: u32,
-    /// Slices of view distance, at least 1.
+    /// Slices of view distance, from 1 to 256.
     pub slices: u32,
     /// Whether slices end at equal ratios of view distance; else in equal steps.
     pub logarithmic: bool,
 }
 
+/// Most slices: words of bits that `cells.comp.glsl` has for a tile.
+const SLICES_MAX: i64 = 256;
+
 /// Parameters of techniques with clusters.
-pub const PARAMS: &[ParamInfo] = &[
-    ParamInfo {
-        key: "cluster-px",
-        summary: "width and height of a cluster, pixels",
-        kind: ParamKind::Integer { min: 8, max: 256 },
-        default: "32",
-    },
-    ParamInfo {
-        key: "slices",
-        summary: "clusters of a tile, one behind the other",
-        kind: ParamKind::Integer { min: 1, max: 256 },
-        default: "32",
-    },
-    ParamInfo {
-        key: "slicing",
-        summary: "view distances at which clusters end: in equal steps, or at equal ratios",
-        kind: ParamKind::Choice { values: &["logarithmic", "uniform"] },
-        default: "logarithmic",
-    },
-];
+pub const PARAMS: &[ParamInfo] = &[CLUSTER_PX, SLICES, SLICING];
+
+/// Width of clusters.
+pub const CLUSTER_PX: ParamInfo = ParamInfo {
+    key: "cluster-px",
+    summary: "width and height of a cluster, pixels",
+    kind: ParamKind::Integer { min: 8, max: 256 },
+    default: "16",
+};
+/// Slices of view distance.
+pub const SLICES: ParamInfo = ParamInfo {
+    key: "slices",
+    summary: "clusters of a tile, one behind the other, between the ends of the scene",
+    kind: ParamKind::Integer { min: 1, max: SLICES_MAX as _ },
+    default: "128",
+};
+/// Where slices end.
+pub const SLICING: ParamInfo = ParamInfo {
+    key: "slicing",
+    summary: "view distances at which clusters end: in equal steps, or at equal ratios",
+    kind: ParamKind::Choice { values: &["logarithmic", "uniform"] },
+    default: "logarithmic",
+};
+/// Width of tiles.
+pub const TILE_PX: ParamInfo = ParamInfo {
+    key: "tile-px",
+    summary: "width and height of a tile, pixels",
+    kind: ParamKind::Integer { min: 8, max: 256 },
+    default: "16",
+};
 
 impl Grid {
     /// The grid that [`PARAMS`] ask for.
-    pub fn of_params(params: &crate::Params, info: &crate::Info) -> Self {
+    pub fn of_params(params: &Params) -> Self {
         Self {
-            cluster_px: params.number(info, "cluster-px") as u32,
-            slices: params.number(info, "slices") as u32,
-            logarithmic: params.text(info, "slicing") == "logarithmic",
+            cluster_px: params.count(&CLUSTER_PX),
+            slices: params.count(&SLICES),
+            logarithmic: params.get(&SLICING) == "logarithmic",
         }
-    }
-
-    /// Most pixels that share one list.
-    pub fn most_pixels(self) -> f64 {
-        f64::from(self.cluster_px) * f64::from(self.cluster_px)
-    }
-
-    /// Clusters of an image.
-    fn clusters(self, frame: &Frame<'_>) -> u64 {
-        let tiles = |size_px: u32| u64::from(size_px.div_ceil(self.cluster_px));
-        tiles(frame.width_px) * tiles(frame.height_px) * u64::from(self.slices)
     }
 }
 
-/// Lists of lights. Words of 32 bits.
-pub struct Clusters {
-    /// Specialization constants of `clusters/lists.glsl`.
-    constants: [(&'static str, u32); 4],
-    /// View distances at which slices begin and the last ends, m, 32-bit floats.
-    pub slices: BufferHandle,
-    /// A bit a cluster: whether it holds a surface. Cluster: tile × slices + slice, tiles by rows.
-    pub bits: BufferHandle,
-    /// Kept clusters before each word of bits.
-    pub before: BufferHandle,
-    /// Kept clusters, ascending.
-    pub kept: BufferHandle,
-    /// Where the list of each kept cluster begins, and where the last ends.
-    pub begins: BufferHandle,
+impl Division {
+    /// Most pixels that share one list.
+    pub fn most_pixels(self) -> f64 {
+        f64::from(self.tile_px()) * f64::from(self.tile_px())
+    }
+
+    fn tile_px(self) -> u32 {
+        match self {
+            Self::Tiles { tile_px } | Self::Tiles25d { tile_px } => tile_px,
+            Self::Clusters(grid) => grid.cluster_px,
+        }
+    }
+
+    /// Cells of a tile.
+    fn slices(self) -> u32 {
+        match self {
+            Self::Clusters(grid) => grid.slices,
+            _ => 1,
+        }
+    }
+
+    fn tiles(self, frame: &Frame<'_>) -> u64 {
+        let tiles = |size_px: u32| u64::from(size_px.div_ceil(self.tile_px()));
+        tiles(frame.width_px) * tiles(frame.height_px)
+    }
+
+    /// Specialization constants of `grid.glsl` but for capacities.
+    fn constants(self) -> [(&'static str, u32); 4] {
+        let (number, logarithmic) = match self {
+            Self::Clusters(grid) => (0, grid.logarithmic),
+            Self::Tiles { .. } => (1, false),
+            Self::Tiles25d { .. } => (2, false),
+        };
+        [
+            ("DIVISION", number),
+            ("LIGHT_TILE_PX", self.tile_px()),
+            ("SLICES", self.slices()),
+            ("LOGARITHMIC", u32::from(logarithmic)),
+        ]
+    }
+}
+
+/// Where view distances of what shows come from.
+pub struct Surfaces<'a> {
+    /// Tag of `clusters/cells.comp`.
+    tag: String,
+    /// Samples a pixel.
+    samples: u32,
+    bind: Box<dyn Fn(&mut ComputePass<'_>) + 'a>,
+}
+
+impl<'a> Surfaces<'a> {
+    /// A depth buffer of that many samples a pixel, reversed.
+    pub fn of_depth(depth: &'a ImageHandle, samples: u32) -> Self {
+        let tag = if samples == 1 { "#one" } else { "" };
+        Self {
+            tag: tag.to_owned(),
+            samples,
+            bind: Box::new(move |pass| _ = pass.read("gbuffer_depth", depth)),
+        }
+    }
+
+    /// The keys of `compute_raster`.
+    pub fn of_keys(keys: &'a BufferHandle, samples: u32) -> Self {
+        Self {
+            tag: "#keys".to_owned(),
+            samples,
+            bind: Box::new(move |pass| _ = pass.read("SampleKeys", keys)),
+        }
+    }
+
+    /// Samples a pixel.
+    pub(crate) fn samples(&self) -> u32 {
+        self.samples
+    }
+
+    /// Tag of the variants of `clusters/cells.comp` and `light_lists/heads.comp` that read it.
+    pub(crate) fn tag(&self) -> &str {
+        &self.tag
+    }
+
+    /// Binds what a shader with `surfaces.glsl` reads.
+    pub(crate) fn bind(&self, shader: &Shader, pass: &mut ComputePass<'_>) {
+        if shader.reflection.spec_constant("SAMPLES").is_some() {
+            pass.constant("SAMPLES", self.samples);
+        }
+        (self.bind)(pass);
+    }
+
+    /// What a variant `#tag` of `clusters/cells.comp` reads.
+    pub(crate) fn of_source(tag: &str, samples: u32, bind: impl Fn(&mut ComputePass<'_>) + 'a) -> Self {
+        Self { tag: format!("#{tag}"), samples, bind: Box::new(bind) }
+    }
+}
+
+/// Lists of lights of cells.
+pub struct CellLists {
+    /// Specialization constants of `clusters/grid.glsl`.
+    constants: Vec<(&'static str, u32)>,
+    tree: LightBvh,
+    /// A cell each: number, nearest and farthest view distance in m, steps that hold a surface; `Cell` in `grid.glsl`.
+    pub cells: BufferHandle,
+    /// Two words for each word of bits: the bits, the cells before.
+    pub words: BufferHandle,
+    /// First and end of the list of each cell.
+    pub ends: BufferHandle,
     /// The lists: lights, ascending; those without an end are on none.
     pub lists: BufferHandle,
 }
 
-impl Clusters {
+impl CellLists {
     /// Binds what `clusters/lists.glsl` reads.
-    pub fn bind(&self, pass: &mut impl Slots) {
-        pass.read_buffer("ClusterSlices", &self.slices);
-        pass.read_buffer("ClusterBits", &self.bits);
-        pass.read_buffer("KeptBefore", &self.before);
-        pass.read_buffer("ListBegins", &self.begins);
-        pass.read_buffer("ClusterLists", &self.lists);
+    pub fn bind(&self, frame: &Frame<'_>, pass: &mut impl Slots) {
+        pass.read_buffer("Cells", &self.cells);
+        pass.read_buffer("CellWords", &self.words);
+        pass.read_buffer("ListEnds", &self.ends);
+        pass.read_buffer("CellLists", &self.lists);
+        self.tree.bind(frame, pass);
     }
 
     /// Specialization constants of what includes `clusters/lists.glsl`.
-    pub fn constants(&self) -> impl Iterator<Item = (&'static str, u32)> {
-        self.constants.into_iter()
+    pub fn constants(&self) -> &[(&'static str, u32)] {
+        &self.constants
     }
 }
 
-/// Checks that a binding holds the words of a buffer, and returns their bytes, at least one word.
-fn bytes_of(frame: &Frame<'_>, technique: &str, what: &str, words: u64) -> Result<u64, TechniqueError> {
-    let bytes = 4 * words.max(1);
-    frame.check_binding(technique, what, bytes)?;
-    Ok(bytes)
-}
+/// Groups that walk over the cells: enough to fill a GPU several times.
+const GROUPS_MAX: u32 = 16_384;
 
-/// Declares the passes from a depth buffer of one sample to lists.
+/// Declares the passes from surfaces to lists.
 ///
 /// # Errors
-/// More clusters, or longer lists, than one binding holds: [`TechniqueError::TooLarge`], in bytes. A shader that is not compiled
+/// More cells, or longer lists, than one binding holds: [`TechniqueError::TooLarge`], in bytes. A shader that is not compiled
 /// in.
 pub fn build(
     graph: &mut Graph,
     frame: &Frame<'_>,
     technique: &str,
-    grid: Grid,
-    depth: &ImageHandle,
-) -> Result<Clusters, TechniqueError> {
-    let stage = Stage::new(frame, technique, grid)?;
-    let slices = stage.slices(graph, depth)?;
-    let bits = stage.mark(graph, depth, &slices)?;
-    let kept = stage.compact(graph, &bits)?;
-    let begins = stage.count(graph, &slices, &kept)?;
-    let lists = stage.fill(graph, &slices, &kept, &begins)?;
-    Ok(Clusters {
-        constants: stage.constants,
-        slices,
-        bits,
-        before: kept.before,
-        kept: kept.clusters,
-        begins,
-        lists,
-    })
+    division: Division,
+    surfaces: &Surfaces<'_>,
+) -> Result<CellLists, TechniqueError> {
+    let stage = Stage::new(frame, technique, division)?;
+    let tree = light_bvh::build(graph, frame, technique)?;
+    let found = stage.find_cells(graph, surfaces)?;
+    let (lists, ends) = stage.assign(graph, &found, &tree)?;
+    Ok(CellLists { constants: stage.constants, tree, cells: found.cells, words: found.words, ends, lists })
 }
 
 /// What all passes of the stage are declared from.
 struct Stage<'a> {
     frame: &'a Frame<'a>,
     technique: &'a str,
-    grid: Grid,
-    constants: [(&'static str, u32); 4],
-    words: u32,
-    cluster_capacity: u32,
+    constants: Vec<(&'static str, u32)>,
+    tiles: u32,
+    words: u64,
+    cell_capacity: u32,
     list_capacity: u32,
 }
 
-/// Clusters that hold a surface.
-struct Kept {
-    clusters: BufferHandle,
-    before: BufferHandle,
+/// Cells that hold a surface.
+struct FoundCells {
+    cells: BufferHandle,
+    words: BufferHandle,
     count: BufferHandle,
-    groups: BufferHandle,
-}
-
-impl Kept {
-    /// Binds what `clusters/cull.glsl` reads.
-    fn bind(&self, pass: &mut ComputePass<'_>, slices: &BufferHandle) {
-        pass.read("ClusterSlices", slices);
-        pass.read("KeptClusters", &self.clusters).read("KeptCount", &self.count);
-    }
 }
 
 impl<'a> Stage<'a> {
-    fn new(frame: &'a Frame<'a>, technique: &'a str, grid: Grid) -> Result<Self, TechniqueError> {
-        let clusters = grid.clusters(frame);
-        let words = clusters.div_ceil(32);
-        let bytes = bytes_of(frame, technique, &format!("the bits of {clusters} clusters"), words)?;
-        let cluster_capacity = frame.capacity("clusters", FIRST_GUESS);
+    fn new(frame: &'a Frame<'a>, technique: &'a str, division: Division) -> Result<Self, TechniqueError> {
+        let tiles = division.tiles(frame);
+        let words = tiles * u64::from(division.slices().div_ceil(32));
+        let cell_capacity = frame.capacity("clusters", FIRST_GUESS);
         let list_capacity = frame.capacity("cluster lights", FIRST_GUESS);
-        bytes_of(
-            frame,
-            technique,
-            &format!("the list of {cluster_capacity} clusters"),
-            u64::from(cluster_capacity) + 1,
-        )?;
-        bytes_of(
-            frame,
-            technique,
-            &format!("the lists of {list_capacity} lights of clusters"),
-            list_capacity.into(),
-        )?;
-        Ok(Self {
-            frame,
-            technique,
-            grid,
-            constants: [
-                ("CLUSTER_PX", grid.cluster_px),
-                ("SLICES", grid.slices),
-                ("CLUSTER_CAPACITY", cluster_capacity),
-                ("LIST_CAPACITY", list_capacity),
-            ],
-            words: (bytes / 4) as u32,
-            cluster_capacity,
-            list_capacity,
-        })
+        for (what, bytes) in [
+            (format!("the bits of {} clusters", tiles * u64::from(division.slices())), 8 * words),
+            (format!("the list of {cell_capacity} clusters"), 16 * u64::from(cell_capacity)),
+            (format!("the lists of {list_capacity} lights of clusters"), 4 * u64::from(list_capacity)),
+        ] {
+            frame.check_binding(technique, &what, bytes)?;
+        }
+        let mut constants = division.constants().to_vec();
+        constants.extend([("CELL_CAPACITY", cell_capacity), ("LIST_CAPACITY", list_capacity)]);
+        Ok(Self { frame, technique, constants, tiles: tiles as u32, words, cell_capacity, list_capacity })
     }
 
-    fn buffer(&self, graph: &mut Graph, name: &str, words: u32) -> BufferHandle {
-        graph.buffer(&format!("{}/{name}", self.technique), 4 * u64::from(words.max(1)))
+    fn name(&self, what: &str) -> String {
+        format!("{}/{what}", self.technique)
     }
 
-    /// A pass `technique/name` of `clusters/file.comp`, with the stage's constants that the shader has.
-    fn pass<'g>(
-        &self,
-        graph: &'g mut Graph,
-        name: &str,
-        file: &str,
-    ) -> Result<ComputePass<'g>, TechniqueError> {
-        let shader = self.frame.shader(&format!("clusters/{file}.comp"))?;
-        let mut pass = self.frame.compute(graph, &format!("{}/{name}", self.technique), &shader);
-        let own = [("WORDS", self.words), ("LOGARITHMIC", u32::from(self.grid.logarithmic))];
-        for (constant, value) in self.constants.into_iter().chain(own) {
+    fn zeroed(&self, graph: &mut Graph, name: &str) -> BufferHandle {
+        let buffer = graph.buffer(&self.name(name), 8);
+        graph.clear_buffer(&self.name(&format!("clear {name}")), buffer, 0)
+    }
+
+    /// A pass `technique/name` of a shader of the stage, with those of the stage's constants that the shader has.
+    fn pass<'g>(&self, graph: &'g mut Graph, name: &str, shader: &Shader) -> ComputePass<'g> {
+        let mut pass = self.frame.compute(graph, &self.name(name), shader);
+        for (constant, value) in &self.constants {
             if shader.reflection.spec_constant(constant).is_some() {
-                pass.constant(constant, value);
+                pass.constant(constant, *value);
             }
         }
-        Ok(pass)
+        pass
     }
 
-    /// View distances at which slices begin, from the range that the depth buffer shows.
-    fn slices(&self, graph: &mut Graph, depth: &ImageHandle) -> Result<BufferHandle, TechniqueError> {
-        let range = self.buffer(graph, "depth range", 2);
-        let range = graph.clear_buffer(&format!("{}/clear range", self.technique), range, 0);
-        let begins = self.buffer(graph, "cluster slices", self.grid.slices + 1);
-        let mut pass = self.pass(graph, "range", "range")?;
-        pass.read("cluster_depth", depth);
-        let range = pass.write("DepthRange", range);
-        pass.dispatch(self.frame.groups(16));
+    /// Cells that hold a surface.
+    fn find_cells(&self, graph: &mut Graph, surfaces: &Surfaces<'_>) -> Result<FoundCells, TechniqueError> {
+        let cells = graph.buffer(&self.name("cells"), 16 * u64::from(self.cell_capacity.max(1)));
+        let words = graph.buffer(&self.name("cell words"), 8 * self.words.max(1));
+        let count = self.zeroed(graph, "cell count");
+        let shader = self.frame.shader(&format!("clusters/cells.comp{}", surfaces.tag))?;
+        let mut pass = self.pass(graph, "cells", &shader);
+        surfaces.bind(&shader, &mut pass);
+        let cells = pass.write("Cells", cells);
+        let words = pass.write("CellWords", words);
+        let count = pass.write("CellCount", count);
+        pass.dispatch([self.tiles, 1, 1]);
         pass.finish();
-
-        let mut pass = self.pass(graph, "slices", "slices")?;
-        pass.read("DepthRange", &range);
-        let begins = pass.write("SliceBegins", begins);
-        pass.dispatch([1, 1, 1]);
-        pass.finish();
-        Ok(begins)
+        self.frame.watch(graph, "clusters", &count, self.cell_capacity, false);
+        Ok(FoundCells { cells, words, count })
     }
 
-    fn mark(
+    /// Lists, and their ends.
+    fn assign(
         &self,
         graph: &mut Graph,
-        depth: &ImageHandle,
-        slices: &BufferHandle,
-    ) -> Result<BufferHandle, TechniqueError> {
-        let bits = self.buffer(graph, "cluster bits", self.words);
-        let bits = graph.clear_buffer(&format!("{}/clear clusters", self.technique), bits, 0);
-        let mut pass = self.pass(graph, "mark", "mark")?;
-        pass.read("cluster_depth", depth).read("ClusterSlices", slices);
-        let bits = pass.write("MarkedClusters", bits);
-        pass.dispatch(self.frame.groups(16));
-        pass.finish();
-        Ok(bits)
-    }
-
-    fn compact(&self, graph: &mut Graph, bits: &BufferHandle) -> Result<Kept, TechniqueError> {
-        let before = self.buffer(graph, "kept before", self.words);
-        let clusters = self.buffer(graph, "kept clusters", self.cluster_capacity);
-        let count = self.buffer(graph, "cluster count", 2);
-        let groups = self.buffer(graph, "cluster groups", 3);
-        let mut pass = self.pass(graph, "compact", "compact")?;
-        pass.read("ClusterBits", bits);
-        let before = pass.write("KeptBeforeOut", before);
-        let clusters = pass.write("KeptOut", clusters);
-        let count = pass.write("ClusterCount", count);
-        let groups = pass.write("ClusterGroups", groups);
-        pass.dispatch([1, 1, 1]);
-        pass.finish();
-        self.frame.watch(graph, "clusters", &count, self.cluster_capacity, false);
-        Ok(Kept { clusters, before, count, groups })
-    }
-
-    /// Where the list of each kept cluster begins.
-    fn count(
-        &self,
-        graph: &mut Graph,
-        slices: &BufferHandle,
-        kept: &Kept,
-    ) -> Result<BufferHandle, TechniqueError> {
-        let lengths = self.buffer(graph, "list lengths", self.cluster_capacity);
-        let begins = self.buffer(graph, "list begins", self.cluster_capacity + 1);
-        let count = self.buffer(graph, "list count", 2);
-        let mut pass = self.pass(graph, "count lights", "count")?;
-        kept.bind(&mut pass, slices);
-        let lengths = pass.write("ListLengths", lengths);
-        pass.dispatch_indirect(&kept.groups, 0);
-        pass.finish();
-
-        let mut pass = self.pass(graph, "scan", "scan")?;
-        pass.read("ListLengths", &lengths).read("KeptCount", &kept.count);
-        let begins = pass.write("ListBeginsOut", begins);
+        found: &FoundCells,
+        tree: &LightBvh,
+    ) -> Result<(BufferHandle, BufferHandle), TechniqueError> {
+        let lists = graph.buffer(&self.name("cell lists"), 4 * u64::from(self.list_capacity.max(1)));
+        let ends = graph.buffer(&self.name("list ends"), 8 * u64::from(self.cell_capacity.max(1)));
+        let count = self.zeroed(graph, "list count");
+        let mut pass = self.pass(graph, "assign lights", &self.frame.shader("clusters/assign.comp")?);
+        pass.read("Cells", &found.cells).read("CellCount", &found.count);
+        tree.bind(self.frame, &mut pass);
+        let lists = pass.write("CellLists", lists);
+        let ends = pass.write("ListEnds", ends);
         let count = pass.write("ListCount", count);
-        pass.dispatch([1, 1, 1]);
+        pass.dispatch([self.cell_capacity.clamp(1, GROUPS_MAX), 1, 1]);
         pass.finish();
         self.frame.watch(graph, "cluster lights", &count, self.list_capacity, false);
-        Ok(begins)
-    }
-
-    fn fill(
-        &self,
-        graph: &mut Graph,
-        slices: &BufferHandle,
-        kept: &Kept,
-        begins: &BufferHandle,
-    ) -> Result<BufferHandle, TechniqueError> {
-        let lists = self.buffer(graph, "cluster lists", self.list_capacity);
-        let mut pass = self.pass(graph, "fill lists", "fill")?;
-        kept.bind(&mut pass, slices);
-        pass.read("ListBegins", begins);
-        let lists = pass.write("ListsOut", lists);
-        pass.dispatch_indirect(&kept.groups, 0);
-        pass.finish();
-        Ok(lists)
+        Ok((lists, ends))
     }
 }

@@ -10,9 +10,10 @@ use afterlight_graph::{BufferHandle, ComputePass, Graph, ImageHandle, Load, Rast
 
 use crate::{
     ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, ParamInfo, ParamKind, Params, Source, Technique,
-    TechniqueError, compute_raster,
+    TechniqueError, clusters, compute_raster,
     cost::{self, Cost, Workload},
     dais_multirate::LowRate,
+    light_step,
     multisample::{self, NO_TRIANGLE_RGBA8, Visible},
     triangle_buffer::{self, Records},
     view,
@@ -110,7 +111,7 @@ static INFO: Info = Info {
     ],
     answers: Answers {
         surface: "triangle IDs and a triangle buffer",
-        lights: "loop over all, or tiles",
+        lights: "loop over all, tiles, clusters, or a tree",
         schedule: "compute, a thread a pixel",
         resolve: "once a triangle",
     },
@@ -118,7 +119,7 @@ static INFO: Info = Info {
     // Texture gradients are analytic.
     exactness: Exactness::Exact { min_psnr_db: 45.0 },
     params: &[
-        multisample::LIGHTS,
+        light_step::LIGHTS,
         FILL,
         CACHE_BUCKETS,
         REFERENCE_BITS,
@@ -163,20 +164,21 @@ pub(crate) fn record(
     }
     let visible = Visible::find(graph, frame, info, frame.samples)?;
     let triangles = triangle_buffer::fill(graph, frame, info.id, &visible)?;
-    shade(graph, frame, info, rate, &format!("dais{}", visible.tag('-')), &triangles.records, |pass| {
+    let source = (&*format!("dais{}", visible.tag('-')), &visible.surfaces());
+    shade(graph, frame, info, rate, source, &triangles.records, |pass| {
         visible.bind(frame, pass);
         triangles.bind(pass);
     })
 }
 
 /// Declares the shading pass by the technique's parameters or, where the frame shows a view of `records`, its passes; `bind` binds
-/// what `source` reads.
+/// what `source`, whose surfaces stand where it says, reads.
 pub(crate) fn shade(
     graph: &mut Graph,
     frame: &Frame<'_>,
     info: &'static Info,
     rate: Option<&LowRate>,
-    source: &str,
+    (source, surfaces): (&str, &clusters::Surfaces<'_>),
     records: &Records,
     bind: impl Fn(&mut ComputePass<'_>),
 ) -> Result<ImageHandle, TechniqueError> {
@@ -186,8 +188,7 @@ pub(crate) fn shade(
             .record(graph, frame);
     }
     let source = format!("{source}{}", rate.map_or("", LowRate::tag));
-    let lights = frame.params.text(info, multisample::LIGHTS.key);
-    multisample::shade(graph, frame, info.id, (&source, frame.samples), lights, |pass| {
+    multisample::shade(graph, frame, info, (&source, frame.samples), surfaces, |pass| {
         if let Some(rate) = rate {
             rate.constants(pass);
         }
@@ -270,7 +271,7 @@ fn record_cached(
     let triangles = list.derivatives(graph, frame, info.id)?;
     let visible = Visible::Ids { ids: references, depth, samples: frame.samples };
     let source = format!("dais-{}{}", if wide { "wide" } else { "refs" }, visible.tag('-'));
-    shade(graph, frame, info, rate, &source, &triangles, |pass| {
+    shade(graph, frame, info, rate, (&source, &visible.surfaces()), &triangles, |pass| {
         visible.bind(frame, pass);
         triangles.bind(pass);
     })

@@ -13,7 +13,7 @@ use crate::{
     dais_multirate::{FULL_RATE, LowRate, SHARE},
     depth_prepass::FIRST_FRAGMENT,
     gbuffer_list::{self, NOT_TAKEN},
-    multisample,
+    clusters, light_step,
     scene_gpu::DRAW_TRIANGLES,
     triangle_buffer, view,
 };
@@ -52,13 +52,13 @@ static INFO: Info = Info {
     sources: &[Source { key: "schied-2015", section: "4.1" }],
     answers: Answers {
         surface: "per-pixel lists of triangle references, and a triangle buffer",
-        lights: "loop over all, or tiles",
+        lights: "loop over all, tiles, clusters, or a tree",
         schedule: "compute, a thread a pixel",
         resolve: "once a triangle, weighted by coverage",
     },
     appendix_a: dais::APPENDIX_A,
     exactness: Exactness::Exact { min_psnr_db: 45.0 },
-    params: &[multisample::LIGHTS, NODES, BANDS, dais::CACHE_BUCKETS, FULL_RATE, SHARE],
+    params: &[light_step::LIGHTS, NODES, BANDS, dais::CACHE_BUCKETS, FULL_RATE, SHARE],
     needs: &[Need { name: "post-depth coverage", test: |features| features.post_depth_coverage }],
     samples: MULTIPLE_SAMPLES,
     tessellation: true,
@@ -90,10 +90,12 @@ impl Technique for DaisList {
         let rate = LowRate::chosen(frame, &INFO)?;
         let source = if frame.tessellate_px.is_some() { "dais-nodes-places" } else { "dais-nodes" };
         let stored = triangles.store(graph, frame)?;
-        dais::shade(graph, frame, &INFO, rate.as_ref(), source, stored.records(), |pass| {
+        let bind = |pass: &mut ComputePass<'_>| {
             lists.bind(pass);
             stored.bind(pass);
-        })
+        };
+        let surfaces = clusters::Surfaces::of_source(source, frame.samples, bind);
+        dais::shade(graph, frame, &INFO, rate.as_ref(), (source, &surfaces), stored.records(), bind)
     }
 }
 

@@ -10,7 +10,7 @@ use crate::{
     cost::{self, Cost, Workload},
     dais,
     graph::gpu,
-    multisample, view,
+    light_step, view,
 };
 
 /// The technique.
@@ -46,6 +46,9 @@ fn has_quads(features: &gpu::Features) -> bool {
     features.subgroup_operations.contains(SubgroupFeatureFlags::QUAD)
         && features.subgroup_stages.contains(ShaderStageFlags::COMPUTE)
 }
+
+/// Threads of a group of `multisample/shade.comp`.
+const SHADING_THREADS: u32 = 64;
 
 /// Bytes of shared memory that the shading grid of a group takes: three words for each triangle that may show, three floats a
 /// thread, and some.
@@ -88,8 +91,7 @@ impl LowRate {
                 "subgroup quad operations for share=quads (share=grid does without)".to_owned(),
             );
         }
-        let threads = if frame.params.text(info, multisample::LIGHTS.key) == "tiled" { 256 } else { 64 };
-        let needed = grid_bytes(threads, frame.samples);
+        let needed = grid_bytes(SHADING_THREADS, frame.samples);
         let there = frame.features().max_shared_memory_bytes;
         if !quads && needed > there {
             return unavailable(format!(
@@ -124,7 +126,7 @@ static INFO: Info = Info {
     ],
     answers: Answers {
         surface: "triangle IDs and a triangle buffer",
-        lights: "loop over all, or tiles",
+        lights: "loop over all, tiles, clusters, or a tree",
         schedule: "compute, a thread a pixel; indirect light a few threads a triangle and cell of pixels",
         resolve: "once a triangle",
     },
@@ -134,7 +136,7 @@ static INFO: Info = Info {
         min_psnr_db: 40.0,
     },
     params: &[
-        multisample::LIGHTS,
+        light_step::LIGHTS,
         RATE,
         SHARE,
         dais::FILL,

@@ -7,7 +7,10 @@ use afterlight_graph::{Graph, ImageHandle, Load, gpu::vk};
 use crate::{
     Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError,
     cost::{self, Cost, Workload},
-    gbuffer, volumes,
+    clusters::Surfaces,
+    gbuffer,
+    light_step::{self, LightStep},
+    volumes,
 };
 
 /// The technique.
@@ -23,8 +26,8 @@ static INFO: Info = Info {
     sources: &[Source { key: "petrescu-2016", section: "4.3" }],
     answers: Answers {
         surface: "G-buffer, 1 sample",
-        lights: "light volumes",
-        schedule: "fragment shader",
+        lights: "light volumes; or a loop over all, lists, tiles, clusters, a tree",
+        schedule: "fragment shader; compute with lists of lights",
         resolve: "one sample",
     },
     appendix_a: AppendixA {
@@ -37,7 +40,7 @@ static INFO: Info = Info {
         rates_decoupled: "n, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
-    params: &[],
+    params: &[light_step::GBUFFER_LIGHTS],
     needs: &[],
     samples: &[1],
     tessellation: true,
@@ -54,7 +57,20 @@ impl Technique for Deferred {
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
-        let mut filled = gbuffer::fill(graph, frame, "deferred", vk::Format::D32_SFLOAT)?;
+        let mut filled = gbuffer::fill(graph, frame, INFO.id, vk::Format::D32_SFLOAT)?;
+        match light_step::chosen(frame, &INFO) {
+            "volumes" => {}
+            "lists" => {
+                let lists = LightStep::lists(graph, frame, &INFO, &filled.depth)?;
+                return gbuffer::shade(graph, frame, INFO.id, filled, &lists);
+            }
+            _ => {
+                let surfaces = Surfaces::of_depth(&filled.depth, 1);
+                let step = LightStep::build(graph, frame, &INFO, &surfaces)?;
+                drop(surfaces);
+                return gbuffer::shade(graph, frame, INFO.id, filled, &step);
+            }
+        }
         let mut pass = graph.raster("deferred/lights");
         frame.bind_scene(&mut pass);
         gbuffer::bind(&mut pass, &filled);

@@ -7,7 +7,7 @@ use afterlight_graph::{Graph, ImageHandle};
 use crate::{
     Answers, AppendixA, Exactness, Frame, Info, MULTIPLE_SAMPLES, Params, Source, Technique, TechniqueError,
     cost::{Cost, Workload, deferred_dedup},
-    multisample,
+    light_step, multisample,
 };
 
 /// The technique.
@@ -23,7 +23,7 @@ static INFO: Info = Info {
     sources: &[Source { key: "schied-2015", section: "5" }],
     answers: Answers {
         surface: "G-buffer, MSAA with triangle IDs",
-        lights: "loop over all, or tiles",
+        lights: "loop over all, tiles, clusters, or a tree",
         schedule: "compute, a thread a pixel",
         resolve: "once a triangle",
     },
@@ -37,7 +37,7 @@ static INFO: Info = Info {
         rates_decoupled: "n, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
-    params: &[multisample::LIGHTS],
+    params: &[light_step::LIGHTS],
     needs: &[multisample::STANDARD_LOCATIONS],
     samples: MULTIPLE_SAMPLES,
     tessellation: true,
@@ -55,9 +55,7 @@ impl Technique for DeferredDedup {
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let filled = multisample::fill_dedup(graph, frame, "deferred-dedup")?;
-        let lights = frame.params.text(&INFO, "lights");
-        multisample::shade(graph, frame, "deferred-dedup", ("dedup", frame.samples), lights, |pass| {
-            filled.bind(pass)
-        })
+        let surfaces = filled.surfaces(frame);
+        multisample::shade(graph, frame, &INFO, ("dedup", frame.samples), &surfaces, |pass| filled.bind(pass))
     }
 }

@@ -8,6 +8,7 @@ use afterlight_graph::{DepthTest, Graph, ImageHandle, Load, StencilFace, Stencil
 use crate::{
     Answers, AppendixA, Exactness, Frame, Info, MULTIPLE_SAMPLES, Params, Source, Technique, TechniqueError,
     cost::{Cost, Workload, deferred_msaa},
+    light_step,
     multisample::{self, SampleBuffer, emission_variant},
 };
 
@@ -27,8 +28,8 @@ static INFO: Info = Info {
     ],
     answers: Answers {
         surface: "G-buffer, multisampled",
-        lights: "loop over all, or tiles",
-        schedule: "fragment shader; compute with tiles",
+        lights: "loop over all, tiles, clusters, or a tree",
+        schedule: "fragment shader; compute with lists of lights",
         resolve: "edges only",
     },
     appendix_a: AppendixA {
@@ -41,7 +42,7 @@ static INFO: Info = Info {
         rates_decoupled: "n, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
-    params: &[multisample::LIGHTS],
+    params: &[light_step::LIGHTS],
     needs: &[multisample::STANDARD_LOCATIONS],
     samples: MULTIPLE_SAMPLES,
     tessellation: true,
@@ -69,14 +70,11 @@ impl Technique for DeferredMsaa {
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let filled = multisample::fill_samples(graph, frame, "deferred-msaa")?;
-        match frame.params.text(&INFO, "lights") {
-            "tiled" => {
-                multisample::shade(graph, frame, "deferred-msaa", ("msaa", frame.samples), "tiled", |pass| {
-                    filled.bind(pass);
-                })
-            }
-            _ => shade_by_stencil(graph, frame, &filled),
+        if light_step::chosen(frame, &INFO) == "all" {
+            return shade_by_stencil(graph, frame, &filled);
         }
+        let surfaces = filled.surfaces(frame);
+        multisample::shade(graph, frame, &INFO, ("msaa", frame.samples), &surfaces, |pass| filled.bind(pass))
     }
 }
 

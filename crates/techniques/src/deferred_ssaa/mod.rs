@@ -7,7 +7,7 @@ use afterlight_graph::{Graph, ImageHandle};
 use crate::{
     Answers, AppendixA, Exactness, Frame, Info, MULTIPLE_SAMPLES, Params, Source, Technique, TechniqueError,
     cost::{Cost, Workload, deferred_msaa},
-    multisample,
+    light_step, multisample,
 };
 
 /// The technique.
@@ -26,7 +26,7 @@ static INFO: Info = Info {
     ],
     answers: Answers {
         surface: "G-buffer, multisampled",
-        lights: "loop over all, or tiles",
+        lights: "loop over all, tiles, clusters, or a tree",
         schedule: "compute, a thread a pixel",
         resolve: "shade all samples",
     },
@@ -40,7 +40,7 @@ static INFO: Info = Info {
         rates_decoupled: "n, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
-    params: &[multisample::LIGHTS],
+    params: &[light_step::LIGHTS],
     needs: &[multisample::STANDARD_LOCATIONS],
     samples: MULTIPLE_SAMPLES,
     tessellation: true,
@@ -58,9 +58,7 @@ impl Technique for DeferredSsaa {
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let filled = multisample::fill_samples(graph, frame, "deferred-ssaa")?;
-        let lights = frame.params.text(&INFO, "lights");
-        multisample::shade(graph, frame, "deferred-ssaa", ("ssaa", frame.samples), lights, |pass| {
-            filled.bind(pass)
-        })
+        let surfaces = filled.surfaces(frame);
+        multisample::shade(graph, frame, &INFO, ("ssaa", frame.samples), &surfaces, |pass| filled.bind(pass))
     }
 }

@@ -16,6 +16,7 @@ use crate::{
     error::TechniqueError,
     frame::{Frame, Slots},
     geometry::Surfaces,
+    light_step::LightStep,
 };
 
 /// Handles of a filled G-buffer.
@@ -73,4 +74,27 @@ pub fn bind(pass: &mut impl Slots, gbuffer: &GBuffer) {
     pass.read_image("gbuffer_base_color", &gbuffer.base_color);
     pass.read_image("gbuffer_normal", &gbuffer.normal);
     pass.read_image("gbuffer_roughness", &gbuffer.roughness);
+}
+
+/// Declares the pass `technique/shade`: adds the lights that every pixel's surface visits to the accumulation, which is returned.
+///
+/// # Errors
+/// A shader that is not compiled in.
+pub fn shade(
+    graph: &mut Graph,
+    frame: &Frame<'_>,
+    technique: &str,
+    filled: GBuffer,
+    step: &LightStep,
+) -> Result<ImageHandle, TechniqueError> {
+    let mut pass = frame.compute(graph, &format!("{technique}/shade"), &frame.shader("gbuffer/shade.comp")?);
+    bind(&mut pass, &filled);
+    step.bind(frame, &mut pass);
+    for (constant, value) in step.constants() {
+        pass.constant(&constant, value);
+    }
+    let radiance = pass.write("hdr", filled.accumulation);
+    pass.dispatch(frame.groups(8));
+    pass.finish();
+    Ok(radiance)
 }

@@ -10,10 +10,11 @@ use afterlight_graph::{
 
 use crate::{
     ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, ParamInfo, ParamKind, Params, Source, Technique,
-    TechniqueError, compute_raster,
+    TechniqueError, clusters, compute_raster,
     cost::{self, Cost, Workload},
     depth_prepass::FIRST_FRAGMENT,
     geometry::Surfaces,
+    light_step,
     multisample::{self, Visible},
 };
 
@@ -55,7 +56,7 @@ static INFO: Info = Info {
     sources: &[Source { key: "fridvalszky-2020", section: "3 to 5" }],
     answers: Answers {
         surface: "G-buffer, per-pixel lists",
-        lights: "loop over all, or tiles",
+        lights: "loop over all, tiles, clusters, or a tree",
         schedule: "compute, a thread a pixel",
         resolve: "once a triangle, weighted by coverage",
     },
@@ -71,7 +72,7 @@ static INFO: Info = Info {
     // Texture gradients are analytic where compute fills.
     exactness: Exactness::Exact { min_psnr_db: 45.0 },
     params: &[
-        multisample::LIGHTS,
+        light_step::LIGHTS,
         FILL,
         compute_raster::VISIBILITY,
         compute_raster::SMALL,
@@ -222,13 +223,16 @@ impl Technique for GbufferList {
             _ => fill_by_compute(graph, frame, &layout)?,
         };
         frame.watch(graph, "blocks", &lists.count, layout.capacity, layout.is_fixed);
-        let lights = frame.params.text(&INFO, multisample::LIGHTS.key);
         let source = match &lists.samples {
             Samples::Keys(_) => "list-keys",
             Samples::Depth(_) if layout.samples == 1 => "list-one",
             Samples::Depth(_) => "list",
         };
-        multisample::shade(graph, frame, INFO.id, (source, layout.samples), lights, |pass| {
+        let surfaces = match &lists.samples {
+            Samples::Keys(keys) => clusters::Surfaces::of_keys(keys, layout.samples),
+            Samples::Depth(depth) => clusters::Surfaces::of_depth(depth, layout.samples),
+        };
+        multisample::shade(graph, frame, &INFO, (source, layout.samples), &surfaces, |pass| {
             for (name, value) in layout.constants() {
                 pass.constant(name, value);
             }

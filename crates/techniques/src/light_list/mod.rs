@@ -8,6 +8,7 @@ use crate::{
     Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError,
     cost::{self, Cost, Workload},
     gbuffer, light_lists,
+    light_step::LightStep,
 };
 
 /// The technique.
@@ -58,14 +59,7 @@ impl Technique for LightList {
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let filled = gbuffer::fill(graph, frame, INFO.id, vk::Format::D32_SFLOAT)?;
-        let lists = light_lists::build(graph, frame, &INFO, &filled.depth)?;
-
-        let mut pass = frame.compute(graph, "light-list/shade", &frame.shader("light_list/shade.comp")?);
-        gbuffer::bind(&mut pass, &filled);
-        lists.bind(&mut pass);
-        let radiance = pass.write("hdr", filled.accumulation);
-        pass.dispatch(frame.groups(8));
-        pass.finish();
-        Ok(radiance)
+        let lists = LightStep::lists(graph, frame, &INFO, &filled.depth)?;
+        gbuffer::shade(graph, frame, INFO.id, filled, &lists)
     }
 }

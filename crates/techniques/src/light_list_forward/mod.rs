@@ -2,15 +2,14 @@
 
 // ORDER: 54
 
-use afterlight_graph::{DepthTest, Graph, ImageHandle, Load};
+use afterlight_graph::{Graph, ImageHandle};
 
 use crate::{
-    Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError,
+    ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError,
     cost::{self, Cost, Workload},
-    depth_prepass::{FIRST_FRAGMENT, draw_depth},
-    geometry::Surfaces,
+    depth_prepass::draw_depth,
     light_lists,
-    radiance_target::RadianceTarget,
+    light_step::{LightStep, shade_forward},
 };
 
 /// The technique.
@@ -31,7 +30,7 @@ static INFO: Info = Info {
         surface: "nothing (depth)",
         lights: "per-pixel lists, by light volumes",
         schedule: "fragment shader",
-        resolve: "one sample",
+        resolve: "average of the hardware's samples",
     },
     appendix_a: AppendixA {
         id: "LLiF",
@@ -45,7 +44,7 @@ static INFO: Info = Info {
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
     params: &[light_lists::NODES],
     needs: &[],
-    samples: &[1],
+    samples: ANY_SAMPLES,
     tessellation: true,
     views: &[],
 };
@@ -61,20 +60,7 @@ impl Technique for LightListForward {
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let depth = draw_depth(graph, frame, INFO.id)?;
-        let lists = light_lists::build(graph, frame, &INFO, &depth)?;
-
-        let target = RadianceTarget::new(graph, frame, INFO.id);
-        let shader = "light_list_forward/forward.frag";
-        let shaded = Surfaces::shaded(frame, shader, &format!("{shader}#mask"))?
-            .depth(DepthTest::EQUAL)
-            .stencil(FIRST_FRAGMENT, 1);
-        let mut pass = graph.raster("light-list-forward/shade");
-        frame.bind_scene(&mut pass);
-        lists.bind(&mut pass);
-        let radiance = target.attach(frame, &mut pass);
-        let _depth = pass.stencil(depth, Load::Keep);
-        shaded.draw(frame, &mut pass);
-        pass.finish();
-        Ok(radiance)
+        let lists = LightStep::lists(graph, frame, &INFO, &depth)?;
+        shade_forward(graph, frame, INFO.id, depth, &lists)
     }
 }

@@ -1,17 +1,17 @@
-// Appends a light to the lists of the pixels whose surface lies within its range (Petrescu et al. 2016, section 4.7, Figure 4).
+// Appends a light to the lists of the pixels whose surfaces lie within its range (Petrescu et al. 2016, section 4.7, Figure 4).
 //
-// Drawn by the back faces of volumes that lie behind the surface: a pixel meets one of them a light. Surfaces in front of the
-// volume are told by their distance to the light.
-// In: light_lists_depth. Out: LightHeads, LightNodes, LightNodeCount.
+// Drawn by the back faces of volumes: a pixel meets one of them a light. A pixel's surfaces lie between two points of the ray through its
+// centre: the light is told by its distance to what is between them.
+// In and out: LightHeads. Out: LightNodes, LightNodeCount.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "culling.glsl"
+#include "light_lists/head.glsl"
 
 layout(early_fragment_tests) in;
 
-layout(set = 0, binding = 8) uniform texture2D light_lists_depth;
 layout(set = 0, binding = 14, scalar) buffer LightHeads {
-    uint light_heads[];
+    LightHead light_heads[];
 };
 layout(set = 0, binding = 15, scalar) writeonly buffer LightNodes {
     uvec2 light_nodes[];
@@ -21,31 +21,46 @@ layout(set = 0, binding = 16, scalar) coherent buffer LightNodeCount {
     uint nodes_dropped;
 };
 layout(constant_id = 14) const uint NODE_CAPACITY = 0u;
+// 1 where surfaces may stand off the pixel's centre, at its samples.
+layout(constant_id = 15) const uint SAMPLED = 0u;
 
 // The count stays here, above every capacity and below its end by more threads than run at once: it does not begin anew.
 const uint MOST_NEEDED = 0xf0000000u;
 
 layout(location = 0) flat in uint light_index;
 
-bool is_within_range(ivec2 pixel) {
+bool is_within_range(uint pixel) {
     vec4 sphere = light_sphere(light_index);
-    float depth = texelFetch(light_lists_depth, pixel, 0).r;
-    vec3 to_light = sphere.xyz - position_from_depth(ndc_from_pixel(uvec2(pixel)), depth);
-    return depth > 0.0 && dot(to_light, to_light) <= sphere.w * sphere.w;
+    vec2 range_m = vec2(light_heads[pixel].nearest_m, light_heads[pixel].farthest_m);
+    if (range_m.y < range_m.x) {
+        return false;
+    }
+    vec2 ndc = ndc_from_pixel(uvec2(gl_FragCoord.xy));
+    vec3 near = position_from_depth(ndc, depth_from_distance(range_m.x));
+    vec3 between = position_from_depth(ndc, depth_from_distance(range_m.y)) - near;
+    float along = clamp(dot(sphere.xyz - near, between) / max(dot(between, between), 1e-20), 0.0, 1.0);
+    vec3 to_light = sphere.xyz - (near + along * between);
+    float reach_m = sphere.w;
+    if (SAMPLED != 0u) {
+        vec2 corner = ndc + 1.0 / vec2(frame.size_px);
+        reach_m += distance(near + between, position_from_depth(corner, depth_from_distance(range_m.y)));
+    }
+    return dot(to_light, to_light) <= reach_m * reach_m;
 }
 
 void append(uint pixel) {
     uint node = nodes_needed < MOST_NEEDED ? atomicAdd(nodes_needed, 1u) : MOST_NEEDED;
     if (node < NODE_CAPACITY) {
-        light_nodes[node] = uvec2(light_index, atomicExchange(light_heads[pixel], node + 1u));
+        light_nodes[node] = uvec2(light_index, atomicExchange(light_heads[pixel].link, node + 1u));
     } else if (nodes_dropped < MOST_NEEDED) {
         atomicAdd(nodes_dropped, 1u);
     }
 }
 
 void main() {
-    ivec2 pixel = ivec2(gl_FragCoord.xy);
+    uvec2 place = uvec2(gl_FragCoord.xy);
+    uint pixel = place.y * frame.size_px.x + place.x;
     if (!gl_HelperInvocation && is_within_range(pixel)) {
-        append(uint(pixel.y) * frame.size_px.x + uint(pixel.x));
+        append(pixel);
     }
 }

@@ -1,30 +1,41 @@
 //! Lists of lights, one a pixel, for `light-list` and `light-list-forward`: see the README of this folder.
 
-use afterlight_graph::{BufferHandle, Graph, ImageHandle, gpu::vk};
+use afterlight_graph::{BufferHandle, DepthTest, Graph, ImageHandle, gpu::vk};
 
 use crate::{
-    Frame, ParamInfo, ParamKind, TechniqueError, capacity::FIRST_GUESS, cost::Workload, frame::Slots, volumes,
+    Frame, ParamInfo, ParamKind, TechniqueError,
+    capacity::FIRST_GUESS,
+    clusters::Surfaces,
+    cost::Workload,
+    frame::Slots,
+    light_bvh::{self, LightBvh},
+    volumes,
 };
 
 /// Nodes of the lists.
 pub const NODES: ParamInfo = ParamInfo {
-    key: "nodes",
+    key: "light-nodes",
     summary: "nodes of the light lists; auto: as many as the view needs, counted; fixed: what finds none is dropped and told",
     kind: ParamKind::AutoOrInteger { min: 0, max: MOST_NODES },
     default: "auto",
 };
 
+/// Name of the counter of nodes.
+const COUNTER: &str = "light nodes";
+
 /// Most nodes, below where the count on the device ends.
 const MOST_NODES: u32 = 1 << 30;
 
-/// The lists of a frame: a head of 4 bytes a pixel, nodes of 8 bytes.
+/// The lists of a frame: a head of 12 bytes a pixel, nodes of 8 bytes.
 pub struct LightLists {
     heads: BufferHandle,
     nodes: BufferHandle,
+    tree: LightBvh,
 }
 
-/// Declares `technique/lists`: each light with an end is appended to the list of every pixel whose surface lies within its range.
-/// `depth` is the surfaces' depth, reversed, with or without stencil.
+/// Declares `technique/heads` and `technique/lists`: each light with an end is appended to the list of every pixel that it reaches
+/// between the nearest and the farthest of the pixel's surfaces. With depth of one sample, reversed, with or without stencil, what
+/// lies behind the surface is not drawn.
 ///
 /// # Errors
 /// More nodes than the device binds, a shader that is not compiled in.
@@ -32,56 +43,77 @@ pub fn build(
     graph: &mut Graph,
     frame: &Frame<'_>,
     info: &crate::Info,
-    depth: &ImageHandle,
+    surfaces: &Surfaces<'_>,
+    depth: Option<&ImageHandle>,
 ) -> Result<LightLists, TechniqueError> {
-    let pixels = u64::from(frame.width_px) * u64::from(frame.height_px);
     let fixed: Option<u32> = frame.params.text(info, NODES.key).parse().ok();
-    let capacity = fixed.unwrap_or_else(|| frame.capacity(NODES.key, FIRST_GUESS));
-    frame.check_binding(info.id, "light heads", 4 * pixels)?;
+    let capacity = fixed.unwrap_or_else(|| frame.capacity(COUNTER, FIRST_GUESS));
     frame.check_binding(info.id, "light nodes", 8 * u64::from(capacity))?;
-    let zeroed = |graph: &mut Graph, name: &str, bytes: u64| {
-        let buffer = graph.buffer(&format!("{}/{name}", info.id), bytes);
-        graph.clear_buffer(&format!("{}/clear {name}", info.id), buffer, 0)
-    };
-    let mut heads = zeroed(graph, "light heads", 4 * pixels);
-    let mut count = zeroed(graph, "light node count", 8);
+    let tree = light_bvh::build(graph, frame, info.id)?;
+    let mut heads = empty_heads(graph, frame, info.id, surfaces)?;
+    let count = graph.buffer(&format!("{}/light node count", info.id), 8);
+    let mut count = graph.clear_buffer(&format!("{}/clear light node count", info.id), count, 0);
     let mut nodes = graph.buffer(&format!("{}/light nodes", info.id), 8 * u64::from(capacity.max(1)));
 
-    let bounded = frame.lights.count - frame.lights.unbounded_count;
+    let bounded = frame.lights.bounded_count();
     if bounded > 0 {
+        let test = depth.map_or(DepthTest::OFF, |_| volumes::BEHIND_SURFACE);
         let state = volumes::volume_state(
             frame,
             Some("light_lists/append.frag"),
             vk::CullModeFlags::FRONT,
             Vec::new(),
         )?
-        .depth(volumes::BEHIND_SURFACE)
-        .constant("NODE_CAPACITY", capacity);
+        .depth(test)
+        .constant("NODE_CAPACITY", capacity)
+        .constant("SAMPLED", u32::from(surfaces.samples() > 1));
         let mut pass = graph.raster(&format!("{}/lists", info.id));
         frame.bind_scene(&mut pass);
-        pass.read_image("light_lists_depth", depth);
         heads = pass.write("LightHeads", heads);
         nodes = pass.write("LightNodes", nodes);
         count = pass.write("LightNodeCount", count);
-        pass.depth_read_only(depth);
+        match depth {
+            Some(depth) => _ = pass.depth_read_only(depth),
+            None => _ = pass.extent(frame.width_px, frame.height_px),
+        }
         pass.draw(volumes::volume_draw(frame, state, frame.lights.unbounded_count, bounded));
         pass.finish();
     } else {
         nodes = graph.clear_buffer(&format!("{}/clear light nodes", info.id), nodes, 0);
     }
-    frame.watch(graph, NODES.key, &count, capacity, fixed.is_some());
-    Ok(LightLists { heads, nodes })
+    frame.watch(graph, COUNTER, &count, capacity, fixed.is_some());
+    Ok(LightLists { heads, nodes, tree })
+}
+
+/// Heads of empty lists, and where the surfaces of each pixel lie.
+fn empty_heads(
+    graph: &mut Graph,
+    frame: &Frame<'_>,
+    technique: &str,
+    surfaces: &Surfaces<'_>,
+) -> Result<BufferHandle, TechniqueError> {
+    let bytes = 12 * u64::from(frame.width_px) * u64::from(frame.height_px);
+    frame.check_binding(technique, "light heads", bytes)?;
+    let heads = graph.buffer(&format!("{technique}/light heads"), bytes);
+    let shader = frame.shader(&format!("light_lists/heads.comp{}", surfaces.tag()))?;
+    let mut pass = frame.compute(graph, &format!("{technique}/heads"), &shader);
+    surfaces.bind(&shader, &mut pass);
+    let heads = pass.write("LightHeads", heads);
+    pass.dispatch(frame.groups(8));
+    pass.finish();
+    Ok(heads)
 }
 
 impl LightLists {
     /// Binds what `lists.glsl` reads.
-    pub fn bind(&self, pass: &mut impl Slots) {
+    pub fn bind(&self, frame: &Frame<'_>, pass: &mut impl Slots) {
         pass.read_buffer("LightHeads", &self.heads);
         pass.read_buffer("LightNodes", &self.nodes);
+        self.tree.bind(frame, pass);
     }
 }
 
-/// The workload with the lists' memory: a float a pixel, two a pair of a light and a pixel.
+/// The workload with the lists' memory: three floats a pixel, two a pair of a light and a pixel.
 pub fn with_lists(workload: &Workload) -> Workload {
-    Workload { light_list_floats: workload.pixels + 2.0 * workload.light_fragments, ..*workload }
+    Workload { light_list_floats: 3.0 * workload.pixels + 2.0 * workload.light_fragments, ..*workload }
 }

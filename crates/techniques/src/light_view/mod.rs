@@ -103,9 +103,7 @@ fn perspective_view(light: &Light, target_ws: Vec3, angle_rad: f32, bounds_ws: &
 
 /// The light of a scene's settings, and its view; `None` without a light or a surface. Displaced surfaces are in view too.
 pub(crate) fn source(scene: &SceneGpu, settings: &Settings) -> Option<SourceView> {
-    let bounds = scene.draw_infos.iter().fold(Aabb::EMPTY, |bounds, draw| bounds.union(&draw.bounds_ws));
-    let displaced = Vec3::splat(settings.displacement_m);
-    SourceView::choose(&settings.lights, &Aabb { min: bounds.min - displaced, max: bounds.max + displaced })
+    SourceView::choose(&settings.lights, &scene.bounds_ws(settings.displacement_m))
 }
 
 /// Uploads constants of a shader.
@@ -146,7 +144,7 @@ pub(crate) fn look_through<T>(
     let mut draws = DrawList::new(frame.device, frame.scene, DrawOptions::default())?;
     draws.update(frame.scene, view.clip_from_world, view.eye_ws, settings.displacement_m)?;
     let name = format!("{pass} view");
-    let constants = upload(frame.device, &name, &view.constants(&settings, frame.lights))?;
+    let constants = upload(frame.device, &name, &view.constants(&settings, frame.lights, frame.scene))?;
     let imported = [
         graph.import_buffer(&name, &constants),
         graph.import_buffer(&format!("{pass} draw commands"), &draws.commands),

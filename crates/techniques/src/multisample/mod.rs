@@ -15,20 +15,13 @@ pub use visible::Visible;
 use afterlight_graph::{BufferHandle, ComputePass, Graph, ImageHandle, Load, RasterPass, gpu::vk};
 
 use crate::{
+    Info, clusters,
     error::TechniqueError,
     frame::{Frame, Slots},
     geometry::Surfaces,
-    params::{ParamInfo, ParamKind},
+    light_step::LightStep,
     technique::Need,
     view,
-};
-
-/// How the samples' lights are found.
-pub const LIGHTS: ParamInfo = ParamInfo {
-    key: "lights",
-    summary: "lights that a surface visits: all, or those that touch its 16×16 tile",
-    kind: ParamKind::Choice { values: &["all", "tiled"] },
-    default: "all",
 };
 
 /// Positions are reconstructed where the samples stand.
@@ -50,6 +43,11 @@ pub struct SampleBuffer {
 }
 
 impl SampleBuffer {
+    /// Where its surfaces stand.
+    pub fn surfaces(&self, frame: &Frame<'_>) -> clusters::Surfaces<'_> {
+        clusters::Surfaces::of_depth(&self.depth, frame.samples)
+    }
+
     /// Binds what a source of surfaces reads.
     pub fn bind(&self, pass: &mut impl Slots) {
         pass.read_image("gbuffer_depth", &self.depth);
@@ -156,21 +154,22 @@ pub(crate) fn shade_constants(frame: &Frame<'_>, samples: u32) -> [(&'static str
 }
 
 /// Declares the pass `technique/shade`: shades every surface that `source` (a tag of `multisample/shade.comp`) holds of a
-/// pixel of `samples` samples and averages them; `bind` binds what the source reads. Returns radiance, RGBA16F.
+/// pixel of `samples` samples by the lights that its parameter `lights` lets them visit and averages them; `surfaces` are where they stand, `bind` binds what the
+/// source reads. Returns radiance, RGBA16F.
 ///
 /// # Errors
-/// A shader that is not compiled in.
+/// As [`LightStep::build`].
 pub fn shade(
     graph: &mut Graph,
     frame: &Frame<'_>,
-    technique: &str,
+    info: &Info,
     (source, samples): (&str, u32),
-    lights: &str,
+    surfaces: &clusters::Surfaces<'_>,
     bind: impl FnOnce(&mut ComputePass<'_>),
 ) -> Result<ImageHandle, TechniqueError> {
-    let tiled = lights == "tiled";
-    let tag = if tiled { format!("{source}-tiled") } else { source.to_owned() };
-    let name = format!("multisample/shade.comp#{tag}");
+    let technique = info.id;
+    let step = LightStep::build(graph, frame, info, surfaces)?;
+    let name = format!("multisample/shade.comp#{source}");
     // Lists hold emission in their blocks, a triangle buffer has no need to.
     let shader = frame.shader(&if source.starts_with("list") || source.starts_with("dais") {
         name
@@ -183,7 +182,11 @@ pub fn shade(
     for (name, value) in shade_constants(frame, samples) {
         pass.constant(name, value);
     }
+    for (name, value) in step.constants() {
+        pass.constant(&name, value);
+    }
     bind(&mut pass);
+    step.bind(frame, &mut pass);
     let radiance = pass.write("hdr", radiance);
     pass.dispatch(frame.groups(shader.reflection.local_size[0]));
     pass.finish();

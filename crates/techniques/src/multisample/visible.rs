@@ -5,7 +5,7 @@ use afterlight_graph::{BufferHandle, Graph, ImageHandle, Load, gpu::vk};
 
 use super::NO_TRIANGLE_RGBA8;
 use crate::{
-    Info, compute_raster,
+    Info, clusters, compute_raster,
     error::TechniqueError,
     frame::{Frame, Slots},
     geometry::Surfaces,
@@ -63,6 +63,14 @@ impl Visible {
         surfaces.draw(frame, &mut pass);
         pass.finish();
         Ok(Self::Ids { ids, depth, samples })
+    }
+
+    /// Where the surfaces stand.
+    pub fn surfaces(&self) -> clusters::Surfaces<'_> {
+        match self {
+            Self::Ids { depth, samples, .. } => clusters::Surfaces::of_depth(depth, *samples),
+            Self::Keys { keys, samples } => clusters::Surfaces::of_keys(keys, *samples),
+        }
     }
 
     /// Samples a pixel.

@@ -5,10 +5,10 @@
 use afterlight_graph::{Graph, ImageHandle};
 
 use crate::{
-    Answers, AppendixA, Exactness, Frame, Info, ParamInfo, ParamKind, Params, Source, Technique,
-    TechniqueError, clustered_forward,
-    clusters::Grid,
+    ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError,
+    clusters::{self, Division},
     cost::{Cost, Workload, tiled_forward},
+    light_step::record_forward,
 };
 
 /// The technique.
@@ -26,7 +26,7 @@ static INFO: Info = Info {
         surface: "nothing (depth)",
         lights: "tiles",
         schedule: "fragment shader",
-        resolve: "one sample",
+        resolve: "average of the hardware's samples",
     },
     appendix_a: AppendixA {
         id: "TF",
@@ -38,21 +38,15 @@ static INFO: Info = Info {
         rates_decoupled: "n, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
-    params: &[ParamInfo {
-        key: "tile-px",
-        summary: "width and height of a tile, pixels",
-        kind: ParamKind::Integer { min: 8, max: 256 },
-        default: "16",
-    }],
+    params: &[clusters::TILE_PX],
     needs: &[],
-    samples: &[1],
+    samples: ANY_SAMPLES,
     tessellation: true,
     views: &[],
 };
 
-/// Clusters as wide as tiles and as deep as what the image shows.
-fn grid(params: &Params) -> Grid {
-    Grid { cluster_px: params.number(&INFO, "tile-px") as u32, slices: 1, logarithmic: false }
+fn division(params: &Params) -> Division {
+    Division::Tiles { tile_px: params.count(&clusters::TILE_PX) }
 }
 
 impl Technique for TiledForward {
@@ -61,10 +55,10 @@ impl Technique for TiledForward {
     }
 
     fn predict(&self, workload: &Workload, params: &Params) -> Cost {
-        tiled_forward(&Workload { pixels_a_tile: grid(params).most_pixels(), ..*workload })
+        tiled_forward(&Workload { pixels_a_tile: division(params).most_pixels(), ..*workload })
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
-        clustered_forward::record(graph, frame, INFO.id, grid(frame.params))
+        record_forward(graph, frame, &INFO, division(frame.params))
     }
 }

@@ -2,12 +2,15 @@
 
 // ORDER: 70
 
-use afterlight_graph::{Graph, ImageHandle, Load, gpu::vk};
+use afterlight_graph::{ComputePass, Graph, ImageHandle, Load, gpu::vk};
 
 use crate::{
-    Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError, compute_raster,
+    Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError,
+    clusters::Surfaces,
+    compute_raster,
     cost::{Cost, Workload, visibility_buffer},
-    geometry::Surfaces,
+    geometry,
+    light_step::{self, LightStep},
 };
 
 /// The technique.
@@ -19,12 +22,12 @@ pub struct Visibility;
 static INFO: Info = Info {
     id: "visibility",
     title: "Visibility buffer",
-    summary: "Surfaces leave four bytes, a triangle ID; a compute group a tile fetches triangles, culls lights and shades.",
+    summary: "Surfaces leave four bytes, a triangle ID; compute fetches triangles and shades by lists of lights.",
     sources: &[Source { key: "petrescu-2016", section: "4.11" }, Source { key: "burns-2013", section: "3" }],
     answers: Answers {
         surface: "triangle IDs",
-        lights: "tiles",
-        schedule: "compute, a group a tile",
+        lights: "loop over all, tiles, clusters, or a tree",
+        schedule: "compute, a thread a pixel",
         resolve: "one sample",
     },
     appendix_a: AppendixA {
@@ -37,7 +40,7 @@ static INFO: Info = Info {
         rates_decoupled: "y, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 45.0 },
-    params: &[compute_raster::VISIBILITY, compute_raster::SMALL],
+    params: &[light_step::LIGHTS, compute_raster::VISIBILITY, compute_raster::SMALL],
     needs: &[],
     samples: &[1],
     tessellation: false,
@@ -62,8 +65,7 @@ impl Technique for Visibility {
         }
         let ids = graph.image("visibility/ids", frame.image_info(vk::Format::R32_UINT));
         let depth = graph.image("visibility/depth", frame.image_info(vk::Format::D32_SFLOAT));
-        let radiance = graph.image("visibility/radiance", frame.image_info(vk::Format::R16G16B16A16_SFLOAT));
-        let surfaces = Surfaces::new(
+        let surfaces = geometry::Surfaces::new(
             frame,
             ("geometry/surface.vert#position", Some("visibility/ids.frag")),
             ("geometry/surface.vert#uv", "visibility/ids.frag#mask"),
@@ -72,28 +74,42 @@ impl Technique for Visibility {
         let mut pass = graph.raster("visibility/ids");
         frame.bind_scene(&mut pass);
         let ids = pass.color_uint(ids, Load::Clear([NO_TRIANGLE; 4]));
-        let _depth = pass.depth(depth, Load::Clear(0.0));
+        let depth = pass.depth(depth, Load::Clear(0.0));
         surfaces.draw(frame, &mut pass);
         pass.finish();
-
-        let mut pass = frame.compute(graph, "visibility/shade", &frame.shader("visibility/shade.comp")?);
-        pass.read("ids", &ids);
-        let radiance = pass.write("hdr", radiance);
-        pass.dispatch(frame.groups(16));
-        pass.finish();
-        Ok(radiance)
+        shade(graph, frame, "visibility/shade.comp", &Surfaces::of_depth(&depth, 1), |pass| {
+            pass.read("ids", &ids);
+        })
     }
 }
 
 /// The same from triangles that compute has found.
 fn shade_keys(graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
     let keys = compute_raster::rasterize(graph, frame, &INFO, 1)?;
+    shade(graph, frame, "visibility/shade.comp#keys", &Surfaces::of_keys(&keys, 1), |pass| {
+        pass.constant("SAMPLES", 1u32);
+        pass.read("SampleKeys", &keys).read("DrawCommands", &frame.buffers.commands);
+    })
+}
+
+/// Lists lights as the technique's `lights` asks, and shades what `surfaces` show.
+fn shade(
+    graph: &mut Graph,
+    frame: &Frame<'_>,
+    shader: &str,
+    surfaces: &Surfaces<'_>,
+    bind: impl FnOnce(&mut ComputePass<'_>),
+) -> Result<ImageHandle, TechniqueError> {
+    let step = LightStep::build(graph, frame, &INFO, surfaces)?;
     let radiance = graph.image("visibility/radiance", frame.image_info(vk::Format::R16G16B16A16_SFLOAT));
-    let mut pass = frame.compute(graph, "visibility/shade", &frame.shader("visibility/shade.comp#keys")?);
-    pass.constant("SAMPLES", 1u32);
-    pass.read("SampleKeys", &keys).read("DrawCommands", &frame.buffers.commands);
+    let mut pass = frame.compute(graph, "visibility/shade", &frame.shader(shader)?);
+    bind(&mut pass);
+    step.bind(frame, &mut pass);
+    for (constant, value) in step.constants() {
+        pass.constant(&constant, value);
+    }
     let radiance = pass.write("hdr", radiance);
-    pass.dispatch(frame.groups(16));
+    pass.dispatch(frame.groups(8));
     pass.finish();
     Ok(radiance)
 }

@@ -1,11 +1,10 @@
-// Clustered deferred shading (Petrescu et al. 2016, section 4.10; Olsson et al. 2012): each pixel visits the lights of its
-// cluster.
+// Shades the G-buffer, a thread a pixel, by the lights that its surface visits (light_step/).
 //
-// In: the G-buffer, the lists of clusters; hdr: accumulation, read and written. Dispatch: 8x8 groups.
+// In: the G-buffer, what light_step/radiance.glsl reads; hdr: accumulation, read and written. Dispatch: 8x8 groups.
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#include "clusters/lists.glsl"
 #include "gbuffer.glsl"
+#include "light_step/radiance.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(set = 0, binding = 12, rgba16f) uniform image2D hdr;
@@ -20,6 +19,6 @@ void main() {
     if (!gbuffer_load(pixel, depth, s)) {
         return;
     }
-    vec3 radiance = clustered_radiance(shading_point(s), uvec2(pixel), distance_from_depth(depth));
+    vec3 radiance = lights_radiance(shading_point(s), uvec2(pixel), distance_from_depth(depth));
     imageStore(hdr, pixel, vec4(imageLoad(hdr, pixel).rgb + radiance, 1.0));
 }

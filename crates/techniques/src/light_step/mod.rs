@@ -1,0 +1,199 @@
+//! The stage by which surfaces find their lights, for every technique that shades a surface at once: the parameter `lights`, what it
+//! builds, and what `radiance.glsl` reads of it.
+
+use afterlight_graph::{DepthTest, Graph, ImageHandle, Load};
+
+use crate::{
+    Info, ParamInfo, ParamKind, Params, TechniqueError,
+    clusters::{self, CellLists, Division, Grid, Surfaces},
+    depth_prepass::{FIRST_FRAGMENT, draw_depth},
+    frame::{Frame, Slots},
+    geometry,
+    light_bvh::{self, LightBvh},
+    light_lists::{self, LightLists},
+    radiance_target::RadianceTarget,
+};
+
+/// Lights up to which a loop over all of them costs less than any structure, by `auto`.
+const FEW_LIGHTS: u32 = 16;
+
+/// Name of the parameter.
+pub(crate) const KEY: &str = "lights";
+
+/// Parameters that every technique with [`KEY`] has as well.
+pub(crate) const CELLS: &[ParamInfo] =
+    &[clusters::TILE_PX, clusters::CLUSTER_PX, clusters::SLICES, clusters::SLICING];
+
+/// Which lights a surface visits, for sources of several surfaces a pixel.
+pub const LIGHTS: ParamInfo = ParamInfo {
+    key: KEY,
+    summary: "lights that a surface visits: all, those on the list of its pixel (lists), its tile (tiles; tiles25 with 32 bits of depth) or its cluster, or those that a tree over the lights leads to; auto: all where they are few, else clusters",
+    kind: ParamKind::Choice { values: &["auto", "all", "lists", "tiles", "tiles25", "clusters", "tree"] },
+    default: "auto",
+};
+
+/// The same for a G-buffer of one sample, where passes may also add lights one by one, or list them for every pixel.
+pub const GBUFFER_LIGHTS: ParamInfo = ParamInfo {
+    key: KEY,
+    summary: "how surfaces find lights: each light's volume adds it (volumes), a loop over all, the list of the pixel, tile (tiles; tiles25 with 32 bits of depth) or cluster, or a tree over the lights",
+    kind: ParamKind::Choice { values: &["volumes", "all", "lists", "tiles", "tiles25", "clusters", "tree"] },
+    default: "volumes",
+};
+
+/// How surfaces find their lights.
+pub enum LightStep {
+    /// Every surface visits all.
+    All,
+    /// By the list of its tile or cluster.
+    Cells(CellLists),
+    /// By the tree over the lights.
+    Tree(LightBvh),
+    /// By the list of its pixel.
+    Lists(LightLists),
+    /// Other passes add them.
+    None,
+}
+
+/// How cells divide the view for a value of `lights`, by the technique's parameters of them or their defaults.
+fn division(value: &str, params: &Params) -> Option<Division> {
+    let tile_px = params.count(&clusters::TILE_PX);
+    Some(match value {
+        "tiles" => Division::Tiles { tile_px },
+        "tiles25" => Division::Tiles25d { tile_px },
+        "clusters" => Division::Clusters(Grid::of_params(params)),
+        _ => return None,
+    })
+}
+
+/// The value of `lights` of a frame's technique, `auto` resolved.
+pub(crate) fn chosen<'a>(frame: &'a Frame<'_>, info: &'a Info) -> &'a str {
+    match frame.params.text(info, KEY) {
+        "auto" if frame.lights.count <= FEW_LIGHTS => "all",
+        "auto" => "clusters",
+        value => value,
+    }
+}
+
+impl LightStep {
+    /// Builds what the technique's `lights` asks for, from where the surfaces of the image stand.
+    ///
+    /// # Errors
+    /// As [`clusters::build`].
+    pub fn build(
+        graph: &mut Graph,
+        frame: &Frame<'_>,
+        info: &Info,
+        surfaces: &Surfaces<'_>,
+    ) -> Result<Self, TechniqueError> {
+        let value = chosen(frame, info);
+        if let Some(division) = division(value, frame.params) {
+            return Ok(Self::Cells(clusters::build(graph, frame, info.id, division, surfaces)?));
+        }
+        Ok(match value {
+            "lists" => Self::Lists(light_lists::build(graph, frame, info, surfaces, None)?),
+            "tree" => Self::Tree(light_bvh::build(graph, frame, info.id)?),
+            "volumes" => Self::None,
+            _ => Self::All,
+        })
+    }
+
+    /// Builds lists of lights a pixel over a depth buffer of the frame's samples.
+    ///
+    /// # Errors
+    /// As [`light_lists::build`].
+    pub fn lists(
+        graph: &mut Graph,
+        frame: &Frame<'_>,
+        info: &Info,
+        depth: &ImageHandle,
+    ) -> Result<Self, TechniqueError> {
+        let surfaces = Surfaces::of_depth(depth, frame.samples);
+        let tested = (frame.samples == 1).then_some(depth);
+        Ok(Self::Lists(light_lists::build(graph, frame, info, &surfaces, tested)?))
+    }
+
+    /// Binds what `radiance.glsl` reads. What the step does not have is read by no one, yet its slots are there: resources of the same
+    /// kinds fill them.
+    pub fn bind(&self, frame: &Frame<'_>, pass: &mut impl Slots) {
+        let b = &frame.buffers;
+        match self {
+            Self::Cells(cells) => cells.bind(frame, pass),
+            _ => {
+                for slot in ["Cells", "CellWords", "ListEnds", "CellLists"] {
+                    pass.read_buffer(slot, &b.positions);
+                }
+                match self {
+                    Self::Tree(tree) => tree.bind(frame, pass),
+                    Self::Lists(_) => {}
+                    _ => pass.read_image("light_boxes", &b.light_spheres),
+                }
+            }
+        }
+        match self {
+            Self::Lists(lists) => lists.bind(frame, pass),
+            _ => {
+                for slot in ["LightHeads", "LightNodes"] {
+                    pass.read_buffer(slot, &b.positions);
+                }
+            }
+        }
+    }
+
+    /// Specialization constants of what includes `radiance.glsl`.
+    pub fn constants(&self) -> Vec<(String, u32)> {
+        let (number, more) = match self {
+            Self::All => (0, &[][..]),
+            Self::Cells(cells) => (1, cells.constants()),
+            Self::Tree(_) => (2, &[][..]),
+            Self::Lists(_) => (3, &[][..]),
+            Self::None => (4, &[][..]),
+        };
+        let all = std::iter::once(("LIGHT_STEP", number)).chain(more.iter().copied());
+        all.map(|(name, value)| (name.to_owned(), value)).collect()
+    }
+}
+
+/// Declares the pass `technique/shade`: forward shading where depth, which [`crate::depth_prepass`] has drawn, is equal. Returns
+/// radiance, the samples of a pixel averaged.
+///
+/// # Errors
+/// A shader that is not compiled in.
+pub(crate) fn shade_forward(
+    graph: &mut Graph,
+    frame: &Frame<'_>,
+    technique: &str,
+    depth: ImageHandle,
+    step: &LightStep,
+) -> Result<ImageHandle, TechniqueError> {
+    let target = RadianceTarget::new(graph, frame, technique);
+    let mut shaded =
+        geometry::Surfaces::shaded(frame, "light_step/forward.frag", "light_step/forward.frag#mask")?
+            .depth(DepthTest::EQUAL)
+            .stencil(FIRST_FRAGMENT, 1);
+    shaded.constants = step.constants();
+    let mut pass = graph.raster(&format!("{technique}/shade"));
+    frame.bind_scene(&mut pass);
+    step.bind(frame, &mut pass);
+    let radiance = target.attach(frame, &mut pass);
+    let _depth = pass.stencil(depth, Load::Keep);
+    shaded.draw(frame, &mut pass);
+    pass.finish();
+    Ok(radiance)
+}
+
+/// A depth pre-pass, lists of lights of the cells that it shows, and forward shading by them.
+///
+/// # Errors
+/// As [`clusters::build`].
+pub(crate) fn record_forward(
+    graph: &mut Graph,
+    frame: &Frame<'_>,
+    info: &Info,
+    division: Division,
+) -> Result<ImageHandle, TechniqueError> {
+    let depth = draw_depth(graph, frame, info.id)?;
+    let surfaces = Surfaces::of_depth(&depth, frame.samples);
+    let lists = clusters::build(graph, frame, info.id, division, &surfaces)?;
+    drop(surfaces);
+    shade_forward(graph, frame, info.id, depth, &LightStep::Cells(lists))
+}

@@ -1,0 +1,47 @@
+// Which lights a surface visits, whatever holds the surface: one code for every technique that shades a surface at once.
+#ifndef AFTERLIGHT_LIGHT_STEP
+#define AFTERLIGHT_LIGHT_STEP
+#include "clusters/lists.glsl"
+#include "light_lists/lists.glsl"
+
+// light_step/mod.rs
+const uint STEP_ALL = 0u;       // all
+const uint STEP_CELLS = 1u;     // those on the list of its cell: tiles, tiles with bits of depth, clusters
+const uint STEP_TREE = 2u;      // those that the tree over the lights leads to
+const uint STEP_LISTS = 3u;     // those on the list of its pixel
+const uint STEP_NONE = 4u;      // none: other passes add them
+layout(constant_id = 46) const uint LIGHT_STEP = STEP_ALL;
+
+// Radiance of the lights, for a surface of a pixel at a view distance.
+vec3 lights_radiance(ShadingPoint p, uvec2 pixel, float distance_m) {
+    if (LIGHT_STEP == STEP_ALL) {
+        return all_lights_radiance(p);
+    }
+    vec3 radiance = vec3(0.0);
+    if (LIGHT_STEP == STEP_NONE) {
+        return radiance;
+    }
+    for (uint i = 0u; i < frame.unbounded_light_count; ++i) {
+        radiance += light_radiance(p, i);
+    }
+    if (LIGHT_STEP == STEP_CELLS) {
+        radiance += cell_radiance(p, pixel, distance_m);
+    } else if (LIGHT_STEP == STEP_TREE) {
+        radiance += tree_radiance(p);
+    } else {
+        radiance += listed_radiance(p, pixel, distance_m);
+    }
+    return radiance;
+}
+
+// Radiance that leaves a surface of a pixel: surface_radiance, by the lights that it visits.
+vec3 stepped_radiance(Surface s, uvec2 pixel) {
+    vec3 radiance = unlit_radiance(s);
+    if (!s.unlit) {
+        float distance_m = dot(frame.distance_from_world, vec4(s.position_ws, 1.0));
+        radiance += lights_radiance(shading_point(s), pixel, distance_m);
+    }
+    return radiance;
+}
+
+#endif

@@ -1,0 +1,129 @@
+//! Every way in which surfaces find their lights gives the image of a loop over all of them, whatever holds the surfaces.
+
+mod common;
+
+use afterlight_techniques::{
+    Params, Settings, Technique, find, registry,
+    scene::{Light, LightKind},
+    shader::Shader,
+};
+use common::{Stage, compiled_with_header, image_of, params, psnr, sources};
+use glam::Vec3;
+
+/// Lights of all kinds, more than a node of the tree holds.
+fn settings(stage: &Stage, samples: u32) -> Settings {
+    let mut settings = stage.settings((96, 54), 120);
+    let position_ws = settings.camera.eye_ws() + Vec3::new(0.1, 0.3, 0.2);
+    let direction_ws = Vec3::new(0.3, -0.8, -0.5).normalize();
+    let light = |kind, range_m| Light { kind, position_ws, direction_ws, intensity: Vec3::ONE, range_m };
+    settings.lights.extend([
+        light(LightKind::Spot { inner_angle_rad: 0.3, outer_angle_rad: 0.9 }, 20.0),
+        light(LightKind::Spot { inner_angle_rad: 0.1, outer_angle_rad: 0.4 }, 30.0),
+        light(LightKind::Directional, f32::INFINITY),
+    ]);
+    Settings { samples, ..settings }
+}
+
+/// The ways that a technique has, apart from those it chooses by itself.
+fn ways(technique: &dyn Technique) -> Vec<&'static str> {
+    let all = Params::known(technique.info()).find(|p| p.key == "lights");
+    let Some(afterlight_techniques::ParamKind::Choice { values }) = all.map(|p| p.kind) else {
+        return Vec::new();
+    };
+    values.iter().copied().filter(|value| !["auto", "all"].contains(value)).collect()
+}
+
+fn agree(technique: &dyn Technique, stage: &Stage, settings: &Settings) {
+    let image = |sets: &[(&str, &str)]| {
+        let mut prepared = stage.prepare_with(technique, settings, &params(technique, sets));
+        let image = image_of(&mut prepared);
+        let counters = prepared.counters().unwrap();
+        assert!(counters.iter().all(|c| c.dropped == 0), "{}: {counters:?}", technique.info().id);
+        image
+    };
+    let reference = image(&[("lights", "all")]);
+    for way in ways(technique) {
+        let db = psnr(&reference, &image(&[("lights", way)]));
+        println!("{} x {}: lights={way} {db:.2} dB", technique.info().id, settings.samples);
+        // Sums in another order, half floats between light volumes; an edge pixel of a mask lost would be 50.
+        let bound = if way == "volumes" { 54.0 } else { 65.0 };
+        assert!(db >= bound, "{}: lights={way}: {db:.2} dB to lights=all", technique.info().id);
+    }
+}
+
+#[test]
+fn every_way_gives_the_image_of_all_lights() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=17000&texture=64");
+    let mut count = 0;
+    for technique in registry() {
+        if ways(*technique).is_empty() {
+            continue;
+        }
+        count += 1;
+        for samples in [1, 4] {
+            let there = technique.info().samples.contains(&samples);
+            if there && technique.missing(gpu.features()).is_empty() {
+                agree(*technique, &stage, &settings(&stage, samples));
+            }
+        }
+    }
+    assert!(count >= 9, "{count} techniques have ways to find lights");
+}
+
+/// Tessellated surfaces, whose triangles only lists and triangle buffers hold.
+#[test]
+fn tessellated_surfaces_find_their_lights() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=17000&texture=64");
+    let tessellated = Settings { tessellate_px: Some(16.0), displacement_m: 0.02, ..settings(&stage, 4) };
+    for id in ["dais", "dais-list"] {
+        agree(find(id).unwrap(), &stage, &tessellated);
+    }
+}
+
+/// A shader with a mistake must be seen: the next slice, the range of another pixel, a node too few.
+#[test]
+fn wrong_lists_are_seen() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=17000&texture=64");
+    let settings = settings(&stage, 1);
+    let technique = find("deferred").unwrap();
+    let mutant = |header, from, to| -> Shader {
+        compiled_with_header("gbuffer/shade.comp", (&sources(), header), &[(from, to)])
+    };
+    let image = |lights, shaders: Vec<Shader>| {
+        let params = params(technique, &[("lights", lights)]);
+        image_of(&mut stage.prepare_shaders(technique, &settings, &params, shaders))
+    };
+    let reference = image("all", Vec::new());
+    for (lights, header, from, to) in [
+        ("clusters", "clusters/lists.glsl", "cell_lists[i]", "cell_lists[list.x]"),
+        ("tiles", "clusters/lists.glsl", "i < list.y;", "i + 1u < list.y;"),
+        (
+            "tree",
+            "light_bvh/boxes.glsl",
+            "lessThanEqual(point_ws, box.high)",
+            "lessThanEqual(point_ws, 0.5 * (box.low + box.high))",
+        ),
+        ("lists", "light_lists/lists.glsl", "link = node.y;", "link = 0u;"),
+    ] {
+        let db = psnr(&reference, &image(lights, vec![mutant(header, from, to)]));
+        println!("{lights}, {to}: {db:.2} dB");
+        assert!(db < 50.0, "{lights}: {to} goes unseen: {db:.2} dB");
+    }
+}
+
+/// The forward families by the hardware's samples.
+#[test]
+fn forward_families_agree_at_several_samples() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=17000&texture=64");
+    let settings = settings(&stage, 4);
+    let reference = stage.image(find("forward").unwrap(), &settings);
+    for id in ["clustered-forward", "tiled-forward", "forward-plus", "light-list-forward"] {
+        let db = psnr(&reference, &stage.image(find(id).unwrap(), &settings));
+        println!("{id} x 4: {db:.2} dB");
+        assert!(db >= 50.0, "{id}: {db:.2} dB to forward at 4 samples");
+    }
+}
