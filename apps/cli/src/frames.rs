@@ -224,6 +224,11 @@ impl Trial {
             let Counter { name, needed, capacity, dropped, .. } = counter;
             format!("{name}: found {needed} needed, {capacity} there; {dropped} samples dropped")
         });
+        if let Some(pairs) = prepared.light_pairs()? {
+            result.counters.insert("light_pairs_tested".to_owned(), pairs.tested.into());
+            result.counters.insert("light_pairs_lit".to_owned(), pairs.lit.into());
+            result.counters.insert("light_pairs_rounded_pixels".to_owned(), pairs.rounded_pixels.into());
+        }
         let cost = chosen.technique.predict(workload, &chosen.params);
         result.cost = Some(CostRecord { cmd: cost.cmd, proc: cost.proc, mem: cost.mem, band: cost.band });
         let (width, height) = prepared.size_px();

@@ -29,6 +29,12 @@ vec3 sharing_color(float log2_count) {
     return heat(1.0 + log2_count / 4.0);
 }
 
+// Black 0, blue 1, green 8 (as many as seeded lights reach a surface), yellow 64, red 512, white 4,096 and more; below 1, means over
+// samples, straight from black.
+vec3 pairs_color(float count) {
+    return heat(count < 1.0 ? count : 1.0 + log2(count) / 3.0);
+}
+
 // Blue 1e-8 and less, green 1e-7, yellow 1e-6, red 1e-5, white 1e-4 and more.
 vec3 error_color(float error) {
     return heat(1.0 + log2(max(error, 1e-8) / 1e-8) / log2(10.0));

@@ -9,6 +9,7 @@
 #include "material.glsl"
 #include "indirect.glsl"
 #include "light_data.glsl"
+#include "light_pairs.glsl"
 #include "shadow.glsl"
 
 // Perceptual roughness below this makes highlights that neither pixels nor 32-bit floats resolve.
@@ -89,6 +90,9 @@ vec3 lobes(ShadingPoint p, vec3 l) {
 
 // What a surface's colours make of light that came as the three parts of lobes(), each in RGB.
 vec3 reflected(ShadingPoint p, vec3 diffuse, vec3 specular, vec3 grazing) {
+    if (LIGHT_PAIRS > 0u) {
+        return diffuse;     // light_prepass/light.frag counts there
+    }
     return (1.0 - p.f0) * p.diffuse * diffuse + p.f0 * specular + grazing;
 }
 
@@ -133,10 +137,14 @@ bool light_arrives(ShadingPoint p, uint index, out vec3 l, out vec3 irradiance) 
     return true;
 }
 
-// Radiance towards the eye that light number `index` causes.
+// Radiance towards the eye that light number `index` causes, or the count of that pair.
 vec3 light_radiance(ShadingPoint p, uint index) {
     vec3 l, irradiance;
-    return light_arrives(p, index, l, irradiance) ? irradiance * reflectance(p, l) : vec3(0.0);
+    bool lit = light_arrives(p, index, l, irradiance);
+    if (LIGHT_PAIRS > 0u) {
+        return light_pair(lit);
+    }
+    return lit ? irradiance * reflectance(p, l) : vec3(0.0);
 }
 
 // Radiance of every light, in order.
@@ -149,8 +157,11 @@ vec3 all_lights_radiance(ShadingPoint p) {
 }
 
 // Radiance that needs no light of the list: emission, the constant ambient term, and indirect light where it is asked for; or the
-// base colour of an unlit surface. A white surface reflects as much as reaches it.
+// base colour of an unlit surface. A white surface reflects as much as reaches it. Nothing where pairs are counted.
 vec3 unlit_radiance(Surface s) {
+    if (LIGHT_PAIRS > 0u) {
+        return vec3(0.0);
+    }
     if (s.unlit) {
         return s.base_color;
     }

@@ -8,7 +8,7 @@ use afterlight_shader::Shader;
 
 use crate::{
     SHADERS, capacity::Capacities, error::TechniqueError, indirect::Rsm, lights::LightList, params::Params,
-    scene_gpu::SceneGpu, shadow::Shadow,
+    scene_gpu::SceneGpu, shadow::Shadow, view,
 };
 
 /// A frame to be recorded: the scene on the device, its buffers imported into the graph, sizes and parameters.
@@ -218,6 +218,7 @@ impl Frame<'_> {
             .chain([
                 ("ONLY_POINT_LIGHTS", u32::from(self.lights.only_points)),
                 ("SHADOWS", u32::from(self.buffers.shadow.as_ref().is_some_and(|s| s.map.is_some()))),
+                ("LIGHT_PAIRS", u32::from(view::counts_light_pairs(self.view))),
                 ("INDIRECT_SAMPLES", self.buffers.rsm.as_ref().map_or(0, Rsm::sample_count)),
             ])
             .filter(|(name, _)| shaders.iter().any(|s| s.reflection.spec_constant(name).is_some()))

@@ -65,6 +65,7 @@ pub use shadow::Shadows;
 pub use technique::{
     ANY_SAMPLES, Answers, AppendixA, Exactness, Info, MULTIPLE_SAMPLES, Need, Source, Technique,
 };
+pub use view::LightPairs;
 
 include!(concat!(env!("OUT_DIR"), "/registry.rs"));
 include!(concat!(env!("OUT_DIR"), "/shaders.rs"));

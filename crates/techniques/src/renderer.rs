@@ -23,7 +23,8 @@ use crate::{
     scene_gpu::{SceneGpu, upload_slice},
     shadow::{self, Shadows},
     technique::Technique,
-    view, volumes,
+    view::{self, LightPairs},
+    volumes,
 };
 
 /// Times that a view is recorded at most until everything that can overflow has room.
@@ -262,14 +263,12 @@ impl Renderer {
             });
         }
         let view = &self.settings.view;
-        if view != view::FINAL && !info.views.contains(&view.as_str()) {
+        let known = [&[view::FINAL], &view::of(technique)[..]].concat();
+        if !known.contains(&view.as_str()) {
             return Err(TechniqueError::UnknownView {
                 technique: info.id,
                 found: view.clone(),
-                known: std::iter::once(view::FINAL)
-                    .chain(info.views.iter().copied())
-                    .collect::<Vec<_>>()
-                    .join(", "),
+                known: known.join(", "),
             });
         }
         Ok(())
@@ -328,7 +327,7 @@ impl Renderer {
             scene: &self.scene,
             lights: &self.lights,
             clip_from_world: view.clip_from_world,
-            background_radiance: settings.environment.background_radiance.into(),
+            background_radiance: background_radiance(settings).into(),
             view: &settings.view,
             tessellate_px: settings.tessellate_px,
             displacement_m: settings.displacement_m,
@@ -341,15 +340,22 @@ impl Renderer {
         shadow::record(&mut graph, &mut frame, settings)?;
         let hdr = technique.record(&mut graph, &frame)?;
         also(&mut graph, &hdr);
-        let hdr_id = settings.keep_hdr.then(|| graph.keep(&hdr));
-        let final_color = post::finish(&self.device, &mut graph, &frame, &hdr, settings.post)?;
+        let counts_pairs = view::counts_light_pairs(&settings.view);
+        let hdr_id = (settings.keep_hdr || counts_pairs).then(|| graph.keep(&hdr));
+        let shown = match counts_pairs {
+            true => view::light_pair_colors(&mut graph, &frame, &hdr)?,
+            false => hdr,
+        };
+        let final_color = post::finish(&self.device, &mut graph, &frame, &shown, settings.post)?;
         let final_id = graph.keep(&final_color);
         let plan = graph.plan(&self.device)?;
         let executor = Executor::new(&self.device, plan)?;
         Ok(Prepared {
             executor,
             demands: capacities.demands(),
-            hdr: hdr_id,
+            hdr: hdr_id.filter(|_| settings.keep_hdr),
+            light_pairs: hdr_id.filter(|_| counts_pairs),
+            samples: settings.samples,
             final_color: final_id,
             draw_calls: draws.visible.iter().map(|b| b.len() as u32).sum(),
             width_px: settings.width_px,
@@ -400,6 +406,9 @@ pub struct Prepared {
     executor: Executor,
     demands: Vec<Demand>,
     hdr: Option<ResourceId>,
+    /// Counts of pairs in the place of radiance.
+    light_pairs: Option<ResourceId>,
+    samples: u32,
     final_color: ResourceId,
     /// Draws in view.
     pub draw_calls: u32,
@@ -424,14 +433,29 @@ impl Prepared {
         Ok(self.executor.read_image(self.final_color)?)
     }
 
-    /// The last frame's linear radiance, RGBA, rows from the top; `None` unless [`Settings::keep_hdr`] was set.
+    /// The last frame's linear radiance, RGBA, rows from the top; `None` unless [`Settings::keep_hdr`] was set. In views of
+    /// [`view::LIGHT_PAIRS`] red is the pairs that a pixel tested, green those that are lit.
     ///
     /// # Errors
     /// The device.
     pub fn hdr_rgba(&mut self) -> Result<Option<Vec<f32>>, TechniqueError> {
         let Some(bytes) = self.hdr_bytes()? else { return Ok(None) };
-        let halves = bytes.chunks_exact(2).map(|b| half::f16::from_le_bytes([b[0], b[1]]).to_f32());
-        Ok(Some(halves.collect()))
+        let scale = if self.light_pairs.is_some() { (1.0 / view::LIGHT_PAIR) as f32 } else { 1.0 };
+        let value = |half: &[u8]| half::f16::from_le_bytes([half[0], half[1]]).to_f32();
+        let of_pixel = |p: &[u8]| {
+            [scale * value(&p[..2]), scale * value(&p[2..4]), scale * value(&p[4..6]), value(&p[6..8])]
+        };
+        Ok(Some(bytes.chunks_exact(8).flat_map(of_pixel).collect()))
+    }
+
+    /// Pairs of a light and a surface that the last frame tested and lit; `None` unless [`Settings::view`] is one of
+    /// [`view::LIGHT_PAIRS`].
+    ///
+    /// # Errors
+    /// The device.
+    pub fn light_pairs(&mut self) -> Result<Option<LightPairs>, TechniqueError> {
+        let Some(counts) = self.light_pairs else { return Ok(None) };
+        Ok(Some(LightPairs::of(&self.executor.read_image(counts)?, self.samples)))
     }
 
     /// The last frame's linear radiance as it lies on the device, RGBA16F.
@@ -502,7 +526,7 @@ impl View {
             tile_count: [settings.width_px.div_ceil(16), settings.height_px.div_ceil(16)],
             ambient_radiance: settings.environment.ambient_radiance.into(),
             light_count: lights.count,
-            background_radiance: settings.environment.background_radiance.into(),
+            background_radiance: background_radiance(settings).into(),
             unbounded_light_count: lights.unbounded_count,
             distance_range_m: distance_range_m(&bounds_ws, distance_from_world, near_m),
         }
@@ -521,6 +545,14 @@ fn distance_range_m(bounds_ws: &Aabb, distance_from_world: Vec4, near_m: f32) ->
     let farthest_m = (1.001 * (center_m + half_m)).max(f32::MIN_POSITIVE * 1e8);
     let nearest_m = (0.999 * (center_m - half_m)).max(0.999 * near_m).max(LEAST_SHARE * farthest_m);
     [nearest_m, farthest_m.max(2.0 * nearest_m)]
+}
+
+/// Radiance of pixels without a surface: none where it would be taken for pairs of lights.
+fn background_radiance(settings: &Settings) -> Vec3 {
+    match view::counts_light_pairs(&settings.view) {
+        true => Vec3::ZERO,
+        false => settings.environment.background_radiance,
+    }
 }
 
 /// Inverse, computed in 64 bits: positions are reconstructed through it.

@@ -102,7 +102,7 @@ pub struct Info {
     pub samples: &'static [u32],
     /// Whether it draws tessellated surfaces: everything that finds triangles again by the index buffer does not.
     pub tessellation: bool,
-    /// Debug views that it has besides `final`, by name.
+    /// Debug views of its own, by name; all that it has: [`crate::view::of`].
     pub views: &'static [&'static str],
 }
 
@@ -124,6 +124,12 @@ pub trait Technique: Send + Sync {
     /// # Errors
     /// [`TechniqueError`] where the frame asks for what it cannot do.
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError>;
+
+    /// Whether its image is a sum over surfaces and lights of `light_radiance` and `unlit_radiance`, by weights, so that pairs of both can
+    /// be counted in the place of radiance ([`crate::view::LightPairs`]); false where radiance is made into something else.
+    fn counts_light_pairs(&self) -> bool {
+        true
+    }
 
     /// What of `info().needs` a device lacks.
     fn missing(&self, features: &gpu::Features) -> Vec<&'static str> {

@@ -53,6 +53,11 @@ impl Technique for Toon {
         tiled_deferred(workload)
     }
 
+    /// Levels of a sum are no sum.
+    fn counts_light_pairs(&self) -> bool {
+        false
+    }
+
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let filled = gbuffer::fill(graph, frame, "toon", vk::Format::D32_SFLOAT)?;
         let mut pass = frame.compute(graph, "toon/shade", &frame.shader("toon/toon.comp")?);

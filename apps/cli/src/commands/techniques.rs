@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use afterlight_techniques::{Exactness, Info, ParamInfo, ParamKind, Params, registry};
+use afterlight_techniques::{Exactness, ParamInfo, ParamKind, Params, Technique, registry, view};
 use serde_json::{Value, json};
 
 use crate::args::ListArgs;
@@ -10,17 +10,18 @@ use crate::failure::Failure;
 use crate::output;
 
 pub fn run(args: &ListArgs) -> Result<(), Failure> {
-    let list: Vec<Value> = registry().iter().map(|technique| technique_json(technique.info())).collect();
+    let list: Vec<Value> = registry().iter().map(|technique| technique_json(*technique)).collect();
     output::json(&args.json, &json!({ "schema": 1, "techniques": list }))?;
     if !args.json.on_stdout() {
         for technique in registry() {
-            output::print(&technique_text(technique.info()));
+            output::print(&technique_text(*technique));
         }
     }
     Ok(())
 }
 
-fn technique_json(info: &Info) -> Value {
+fn technique_json(technique: &dyn Technique) -> Value {
+    let info = technique.info();
     json!({
         "id": info.id,
         "title": info.title,
@@ -33,11 +34,12 @@ fn technique_json(info: &Info) -> Value {
         "needs": info.needs.iter().map(|need| need.name).collect::<Vec<_>>(),
         "samples": info.samples,
         "tessellation": info.tessellation,
-        "views": info.views,
+        "views": view::of(technique),
     })
 }
 
-fn technique_text(info: &Info) -> String {
+fn technique_text(technique: &dyn Technique) -> String {
+    let info = technique.info();
     let mut text = String::new();
     let _ = writeln!(text, "{} — {}", info.id, info.title);
     let _ = writeln!(text, "   {}", info.summary);
@@ -79,8 +81,9 @@ fn technique_text(info: &Info) -> String {
         let needs: Vec<&str> = info.needs.iter().map(|need| need.name).collect();
         let _ = writeln!(text, "   needs      {}", needs.join(", "));
     }
-    if !info.views.is_empty() {
-        let _ = writeln!(text, "   views      {}", info.views.join(", "));
+    let views = view::of(technique);
+    if !views.is_empty() {
+        let _ = writeln!(text, "   views      {}", views.join(", "));
     }
     for param in Params::known(info) {
         let _ =

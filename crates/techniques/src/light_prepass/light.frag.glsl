@@ -15,7 +15,11 @@ void main() {
     vec3 part = vec3(0.0), irradiance = vec3(0.0), l;
     if (gbuffer_load_lobe(pixel, texelFetch(gbuffer_depth, pixel, 0).r, s)) {
         ShadingPoint p = shading_point_for(s, light_index);
-        if (light_arrives(p, light_index, l, irradiance)) {
+        bool lit = light_arrives(p, light_index, l, irradiance);
+        if (LIGHT_PAIRS > 0u) {
+            irradiance = light_pair(lit);
+            part = vec3(1.0, 0.0, 0.0);
+        } else if (lit) {
             part = lobes(p, l);
         } else {
             irradiance = vec3(0.0);

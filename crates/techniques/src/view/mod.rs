@@ -2,13 +2,16 @@
 //!
 //! A view is an image of display colours in place of radiance; it is shown without tone mapping.
 
+mod light_pairs;
 mod records;
 
+pub(crate) use light_pairs::{LIGHT_PAIR, light_pair_colors};
+pub use light_pairs::{LIGHT_COUNT, LIGHT_ERROR, LIGHT_PAIRS, LightPairs, counts_light_pairs};
 pub use records::{ATTRIBUTE_ERRORS, RECORD_SAMPLES, RecordSource};
 
 use afterlight_graph::{Graph, ImageHandle, RasterPass, gpu::vk};
 
-use crate::{error::TechniqueError, frame::Frame};
+use crate::{error::TechniqueError, frame::Frame, technique::Technique};
 
 /// The image itself.
 pub const FINAL: &str = "final";
@@ -34,6 +37,12 @@ pub const TEXTURE_ERROR: &str = "texture-error";
 /// Views of techniques whose samples refer to records of a triangle buffer.
 pub const TRIANGLES: &[&str] =
     &[SAMPLE_USAGE, INVOCATIONS, EDGES, WEIGHTS, TRIANGLE_SHARING, ATTRIBUTE_ERROR, TEXTURE_ERROR];
+
+/// Debug views that a technique has besides [`FINAL`]: its own and those of light pairs.
+pub fn of(technique: &dyn Technique) -> Vec<&'static str> {
+    let pairs = if technique.counts_light_pairs() { LIGHT_PAIRS } else { &[] };
+    technique.info().views.iter().chain(pairs).copied().collect()
+}
 
 /// Whether a view is one of [`RecordSource`].
 pub fn is_of_triangles(view: &str) -> bool {
