@@ -141,13 +141,13 @@ pub struct BenchArgs {
     pub given: Given,
     #[arg(value_name = "EXPERIMENT|all", help = crate::commands::bench::help())]
     pub experiment: String,
-    /// Share of the experiment's width and height; triangles go by its square
+    /// Share of the experiment's width and height, and of the most lights of lights-sweep; triangles go by its square
     #[arg(long, value_name = "F", default_value_t = 1.0, value_parser = share)]
     pub scale: f64,
     /// Scenes; msaa-table2 has three of its own, the dais experiments two
     #[arg(long, alias = "scene", value_name = "SCENE,SCENE…", value_delimiter = ',', default_value = DEFAULT_SCENE)]
     pub scenes: Vec<String>,
-    /// Numbers of seeded lights; msaa-table2 has its own, 5 and 50
+    /// Numbers of seeded lights; msaa-table2 has its own, 5 and 50, lights-sweep 1 to 100,000
     #[arg(long, value_name = "N,N…", value_delimiter = ',', default_value = "100,1000", value_parser = clap::value_parser!(u32).range(0..=LIGHTS_MAX))]
     pub light_counts: Vec<u32>,
     /// Techniques, by their ids, or all
@@ -156,6 +156,12 @@ pub struct BenchArgs {
     /// Frames measured of each technique, after a warm-up frame
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub frames: u32,
+    /// Predicted pairs of a light and a surface a frame beyond which a technique is left out (lights-sweep)
+    #[arg(long, value_name = "N")]
+    pub max_pairs: Option<u64>,
+    /// Predicted draws a frame beyond which a technique is left out (lights-sweep)
+    #[arg(long, value_name = "N")]
+    pub max_commands: Option<u64>,
     /// Views along the camera path (dais-fig5, dais-fig7)
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub views: u32,

@@ -165,6 +165,10 @@ fn lists_are_text_and_json() {
         dais["views"].as_array().is_some_and(|views| views.contains(&"triangle-sharing".into())),
         "{dais}"
     );
+    for one in list {
+        let views = one["views"].as_array().expect("a list");
+        assert!(["light-count", "light-error"].iter().all(|view| views.contains(&(*view).into())), "{one}");
+    }
     let plain = text(&run(&["techniques"]).stdout);
     assert!(plain.contains("forward") && plain.contains("appendix A"), "{plain}");
     let scene = json(&run(&["scene", "builtin:spheres", "--json", "-"]));
@@ -457,6 +461,61 @@ fn bench_dais_fig6_tells_errors_beside_the_paper() {
     let html = fs::read_to_string(folder.path().join("r/report.html")).expect("written");
     assert!(html.contains("position error") && html.contains("data:image/png;base64,"));
     refused(&["bench", "dais-fig6", "--techniques", "forward"], 2, &["forward", "dais"]);
+}
+
+#[test]
+fn bench_lights_sweep_counts_pairs_beside_predictions() {
+    if !has_device() {
+        return;
+    }
+    let size = ["--scenes", "builtin:intersect", "--scale", "0.05", "--frames", "1"];
+    let columns = ["--techniques", "forward,deferred,tiled,gbuffer-list,deferred-dedup"];
+    let lights = ["--light-counts", "100,1,10", "--max-pairs", "100000"];
+    let (found, html) =
+        bench(&[&["lights-sweep"], &size[..], &columns, &lights, &["--report", "r", "--json", "-"]].concat());
+    assert_eq!((&found["schema"], &found["experiment"]), (&1.into(), &"lights-sweep".into()));
+    assert_eq!(found["bounds"]["max_pairs"], 1e5);
+    let rows = found["rows"].as_array().expect("a list");
+    let seen: Vec<_> =
+        rows.iter().map(|row| (&row["scene"]["lights"], &row["settings"]["samples"])).collect();
+    let [one, ten, hundred, four] = [1, 10, 100, 4].map(Value::from);
+    let expected =
+        [(&one, &one), (&one, &four), (&ten, &one), (&ten, &four), (&hundred, &one), (&hundred, &four)];
+    assert_eq!(seen, expected, "a row for each number of samples");
+    let pixels = 64.0 * 36.0;
+    for row in rows.iter().step_by(2) {
+        let count = row["scene"]["lights"].as_f64().expect("a number");
+        let pairs = |column: &str| {
+            let cell = cell(row, column);
+            ["tested", "lit"].map(|what| cell["pairs"][what].as_f64())
+        };
+        // 100 lights in 2,304 pixels, each shaded once at least, are more pairs than were allowed.
+        let forward = cell(row, "forward");
+        if count == 100.0 {
+            let reason = forward["reason"].as_str().expect("a reason");
+            assert!(forward["status"] == "unavailable" && reason.contains("--max-pairs"), "{forward}");
+            assert!(
+                forward["frame_ms"].is_null() && forward["predicted"]["evaluations"].as_f64() > Some(1e5)
+            );
+        } else {
+            let [tested, lit] = pairs("forward");
+            assert_eq!(pairs("gbuffer-list"), [tested, lit], "both visit all lights");
+            assert!(tested <= Some(count * pixels) && lit <= tested, "{forward}");
+            assert!(cell(row, "forward")["over_baseline"].as_f64() > Some(0.0));
+        }
+        let [tested, lit] = pairs("tiled");
+        assert!(lit > Some(0.0) && tested >= lit, "{row}");
+        assert_eq!(pairs("gbuffer-list, lights=tiled")[1], lit);
+        assert_eq!(cell(row, "deferred")["over_baseline"], 1.0);
+        let result = &row["results"][0];
+        assert!(result["cost"]["proc"].as_f64() > Some(0.0), "{result}");
+    }
+    cell(&rows[1], "deferred-dedup 4x");
+    let growth = found["growth"].as_array().expect("a list");
+    let deferred = growth.iter().find(|one| one["column"] == "deferred").expect("told");
+    assert_eq!((&deferred["from_lights"], &deferred["to_lights"]), (&hundred, &hundred));
+    assert_eq!(found["symbols"].as_array().map(Vec::len), Some(3));
+    assert!(html.contains("pairs tested") && html.contains("<path") && html.contains("--max-pairs"));
 }
 
 /// Small enough for a software device: tens of pixels, tens of triangles, a view of the light of 32 texels.

@@ -4,7 +4,7 @@ mod chart;
 mod format;
 mod page;
 
-pub use chart::{Chart, Line};
+pub use chart::{Axes, Chart, Line};
 pub use format::{bytes_text, ms_text, psnr_text};
 
 use afterlight_measure::Run;

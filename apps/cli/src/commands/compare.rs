@@ -159,7 +159,8 @@ pub fn compare(
     Ok(Compared { run, pictures })
 }
 
-fn most_fragments(result: &RunResult) -> Option<u64> {
+/// The most fragments that a pass of it shaded; none where the device does not count.
+pub fn most_fragments(result: &RunResult) -> Option<u64> {
     let of_pass = |pass: &afterlight_measure::Pass| pass.statistics.get("fragment_invocations").copied();
     result.passes.iter().filter_map(of_pass).max().filter(|count| *count > 0)
 }

@@ -81,7 +81,8 @@ mod tests {
         let pixel = |tested: f64, lit: f64| {
             [tested * LIGHT_PAIR, lit * LIGHT_PAIR, 0.0, 1.0].map(|c| f16::from_f64(c).to_le_bytes()).concat()
         };
-        let image = [pixel(2047.0, 3.0), pixel(2048.0, 0.0), pixel(0.0, 0.0), pixel(100_000.0, 0.25)].concat();
+        let image =
+            [pixel(2047.0, 3.0), pixel(2048.0, 0.0), pixel(0.0, 0.0), pixel(100_000.0, 0.25)].concat();
         let found = LightPairs::of(&image, 1);
         // Beyond 65,504 and rounded: 11 bits of 100,000 are 99,968 or 100,032.
         assert!((found.tested - 104_095.0).abs() <= 32.0, "{found:?}");

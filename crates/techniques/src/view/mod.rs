@@ -5,8 +5,8 @@
 mod light_pairs;
 mod records;
 
-pub(crate) use light_pairs::{LIGHT_PAIR, light_pair_colors};
 pub use light_pairs::{LIGHT_COUNT, LIGHT_ERROR, LIGHT_PAIRS, LightPairs, counts_light_pairs};
+pub(crate) use light_pairs::{LIGHT_PAIR, light_pair_colors};
 pub use records::{ATTRIBUTE_ERRORS, RECORD_SAMPLES, RecordSource};
 
 use afterlight_graph::{Graph, ImageHandle, RasterPass, gpu::vk};

@@ -3,6 +3,7 @@
 mod antialiasing;
 mod dais;
 mod dais_fig6;
+mod lights_sweep;
 mod msaa_table1;
 mod msaa_table2;
 mod speed;
@@ -38,6 +39,7 @@ struct Experiment {
 /// All experiments, in the order of `bench all`.
 const EXPERIMENTS: &[Experiment] = &[
     speed::EXPERIMENT,
+    lights_sweep::EXPERIMENT,
     msaa_table1::EXPERIMENT,
     msaa_table2::EXPERIMENT,
     antialiasing::EXPERIMENT,

@@ -257,6 +257,7 @@ impl Flight {
                     values: self.values(column.kind, value),
                 })
                 .collect(),
+            ..Chart::default()
         };
         Part {
             heading: format!("{}, {width}×{height}", self.scene),
