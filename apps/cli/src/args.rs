@@ -153,7 +153,7 @@ pub struct BenchArgs {
     /// Techniques, by their ids, or all
     #[arg(long, value_name = "ID,ID…|all", value_delimiter = ',', default_value = "all")]
     pub techniques: Vec<String>,
-    /// Frames measured of each technique, after a warm-up frame
+    /// Frames measured of each technique, after a warm-up frame; lights-sweep has its own, 3
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub frames: u32,
     /// Predicted pairs of a light and a surface a frame beyond which a technique is left out (lights-sweep)
@@ -190,6 +190,8 @@ pub struct Given {
     pub light_counts: bool,
     /// `--techniques`.
     pub techniques: bool,
+    /// `--frames`.
+    pub frames: bool,
 }
 
 /// Reads nothing of its own: it looks where the values of others come from, and so stands before them in its struct.
@@ -202,6 +204,7 @@ impl FromArgMatches for Given {
             scenes: given("scenes"),
             light_counts: given("light_counts"),
             techniques: given("techniques"),
+            frames: given("frames"),
         })
     }
 

@@ -43,6 +43,7 @@ pub struct Line {
 const WIDTH: f64 = 340.0;
 const HEIGHT: f64 = 170.0;
 const LEFT: f64 = 56.0;
+const RIGHT: f64 = 14.0;
 const TOP: f64 = 8.0;
 const BELOW: f64 = 22.0;
 /// Lines across the plotted area.
@@ -59,19 +60,19 @@ pub(crate) fn charts(charts: &[Chart]) -> Markup {
 fn chart(chart: &Chart) -> Markup {
     let Some(plot) = Plot::of(chart) else { return html! {} };
     let marks = plot.marks();
-    let view_box = format!("0 0 {} {}", LEFT + WIDTH + 8.0, TOP + HEIGHT + BELOW);
+    let view_box = format!("0 0 {} {}", LEFT + WIDTH + RIGHT, TOP + HEIGHT + BELOW);
     html! {
         figure.chart {
             figcaption { b { (chart.title) } @if !marks.is_empty() { " over " (chart.places) } }
             svg viewBox=(view_box) role="img" aria-label=(chart.title) {
-                @for (share, value) in plot.levels() { (level(share, value)) }
+                @for (share, value) in plot.levels() { (level(share, &plot.number(value))) }
+                @for (x, value) in &marks { (mark(*x, &plot.number(*value))) }
                 @for (index, line) in chart.lines.iter().enumerate() {
                     @for path in plot.runs(&line.values) {
                         path d=(path) fill="none" stroke=(colour(index)) stroke-width="2" stroke-linecap="round"
                             stroke-dasharray=[dashes(index)] {}
                     }
                 }
-                @for (x, value) in &marks { (mark(*x, *value)) }
                 @if marks.is_empty() {
                     text x=(LEFT + WIDTH / 2.0) y=(TOP + HEIGHT + 17.0) text-anchor="middle" { (chart.places) }
                 }
@@ -110,25 +111,20 @@ fn key(index: usize) -> String {
 }
 
 /// A line across at a share of the height, with its value.
-fn level(share: f64, value: f64) -> Markup {
+fn level(share: f64, value: &str) -> Markup {
     let y = TOP + HEIGHT * (1.0 - share);
     html! {
         line x1=(LEFT) x2=(LEFT + WIDTH) y1=(y) y2=(y) stroke="var(--line)" {}
-        text x=(LEFT - 6.0) y=(y + 4.0) text-anchor="end" { (short(value)) }
+        text x=(LEFT - 6.0) y=(y + 4.0) text-anchor="end" { (value) }
     }
 }
 
 /// A place on the horizontal axis.
-fn mark(x: f64, value: f64) -> Markup {
+fn mark(x: f64, value: &str) -> Markup {
     html! {
         line x1=(x) x2=(x) y1=(TOP) y2=(TOP + HEIGHT) stroke="var(--line)" {}
-        text x=(x) y=(TOP + HEIGHT + 17.0) text-anchor="middle" { (short(value)) }
+        text x=(x) y=(TOP + HEIGHT + 17.0) text-anchor="middle" { (value) }
     }
-}
-
-/// Three digits, or a power of ten where those would be many.
-fn short(value: f64) -> String {
-    if value >= 1e4 { format!("{value:.0e}") } else { three_digits(value) }
 }
 
 /// Where values stand in the plotted area.
@@ -179,6 +175,15 @@ impl<'a> Plot<'a> {
                     })
                     .collect()
             }
+        }
+    }
+
+    /// A number of an axis; powers of ten are told in full while they are short.
+    fn number(&self, value: f64) -> String {
+        match self {
+            Self::Linear { .. } => three_digits(value),
+            Self::Logarithmic { .. } if (1e-3..1e4).contains(&value) => format!("{value}"),
+            Self::Logarithmic { .. } => format!("{value:.0e}"),
         }
     }
 
@@ -281,6 +286,7 @@ mod tests {
         assert_eq!(plot.x(1, 3), Some(LEFT + WIDTH / 2.0));
         assert_eq!(plot.levels(), [(0.0, 0.1), (0.5, 1.0), (1.0, 10.0)]);
         assert_eq!(plot.marks().len(), 3);
+        assert_eq!([0.1, 1000.0, 1e5, 1e-4].map(|value| plot.number(value)), ["0.1", "1000", "1e5", "1e-4"]);
         for (at, values) in [(&[1.0][..], vec![Some(0.0)]), (&[0.0], vec![Some(1.0)])] {
             assert!(Plot::of(&chart(at, values)).is_none());
         }

@@ -7,7 +7,7 @@
 use afterlight_measure::{Memory, RunResult, SCHEMA, Spread, Status};
 use afterlight_report::{Axes, Chart, Line, bytes_text, ms_text};
 use afterlight_techniques::cost::{Cost, Workload};
-use afterlight_techniques::{Exactness, ParamKind, Params, view};
+use afterlight_techniques::{Exactness, Params, Post, view};
 use serde::Serialize;
 use serde_json::Value;
 
@@ -43,6 +43,9 @@ const TRIANGLES: u32 = 262_144;
 /// The image's own size, pixels.
 const SIZE_PX: (u32, u32) = (1280, 720);
 
+/// Frames measured of each technique where `--frames` is not given: there are many.
+const FRAMES: u32 = 3;
+
 /// Seeded lights that reach a surface point, about.
 const LIT_A_PIXEL: f64 = 8.0;
 
@@ -62,10 +65,10 @@ struct Bounds {
 }
 
 impl Bounds {
-    /// What was asked for, else a frame of some seconds: lavapipe on two cores evaluates about 2e7 pairs and 1.5e4 draws a second, an H200
+    /// What was asked for, else a frame of about a second: lavapipe on two cores evaluates some 2e7 pairs and 1.5e4 draws in one, an H200
     /// 1.7e10 pairs (`forward`, docs/results).
     fn of(args: &BenchArgs, device_kind: &str) -> Self {
-        let (pairs, commands) = if device_kind == "cpu" { (3e7, 3e4) } else { (3e10, 2e6) };
+        let (pairs, commands) = if device_kind == "cpu" { (1e7, 3e4) } else { (3e10, 2e6) };
         Self {
             max_pairs: args.max_pairs.map_or(pairs, |count| count as f64),
             max_commands: args.max_commands.map_or(commands, |count| count as f64),
@@ -214,6 +217,7 @@ fn run(args: &BenchArgs, progress: &Progress) -> Result<Outcome, Failure> {
     let size = at_size(args, SIZE_PX);
     let setups = setups(args)?;
     let counts = counts(args);
+    let frames = if args.given.frames { args.frames } else { FRAMES };
     let notes = notes(args, &size, &counts);
     let mut found = Sweep {
         schema: SCHEMA,
@@ -238,7 +242,8 @@ fn run(args: &BenchArgs, progress: &Progress) -> Result<Outcome, Failure> {
             let common = CommonArgs { lights, ..size.clone() };
             let session = Session::open(&scene, &common, false, progress)?;
             let bounds = Bounds::of(args, &session.device.kind);
-            let Measured { results, cells, workload } = measured(args, &session, &setups, &bounds, progress)?;
+            let Measured { results, cells, workload } =
+                measured(&session, &setups, &bounds, frames, progress)?;
             session.finish(&common, common.quiet)?;
             let labels = setups.iter().map(|setup| setup.label.as_str());
             failed = failed.or_else(|| broken_off(labels.zip(&results)));
@@ -249,11 +254,11 @@ fn run(args: &BenchArgs, progress: &Progress) -> Result<Outcome, Failure> {
                 cells: cells.iter().map(|cell| vec![cell.clone()]).collect(),
             };
             if !common.quiet {
-                output::tell(&args.json, &table_text(&session, &common, args.frames, &table));
+                output::tell(&args.json, &table_text(&session, &common, frames, &table));
             }
-            found.rows.extend(table.rows(&session, &common, args.frames, "none"));
+            found.rows.extend(table.rows(&session, &common, frames, "none"));
             let heading = format!("{scene}, {} lights, ", text::grouped(session.scene.lights));
-            sections.extend(table.parts(&session, &common, args.frames, "none", &heading, NOTE));
+            sections.extend(table.parts(&session, &common, frames, "none", &heading, NOTE));
             found.symbols.push(Symbols { scene: scene.clone(), lights, workload });
             found.bounds = Some(bounds);
             columns.push(cells);
@@ -298,39 +303,21 @@ fn counts(args: &BenchArgs) -> Vec<u32> {
     counts
 }
 
-/// Every technique at one sample a pixel, or `--samples`; those that need several at the fewest from four on. Who can visit all lights
-/// or those of tiles does both.
+/// Every technique with its parameters' defaults or `--set`'s, at one sample a pixel or `--samples`; those that need several at the fewest
+/// from four on.
 fn setups(args: &BenchArgs) -> Result<Vec<Setup>, Failure> {
-    let mut setups = Vec::new();
-    for Chosen { technique, params } in session::choose("--techniques", &args.techniques, &args.common.set)? {
-        let info = technique.info();
+    let setup = |chosen: Chosen| {
+        let info = chosen.technique.info();
         let samples = match args.given.samples {
             true => args.common.samples,
             false if info.samples.contains(&1) => 1,
             false => info.samples.iter().copied().find(|count| *count >= 4).unwrap_or(1),
         };
         let label = if samples == 1 { info.id.to_owned() } else { format!("{} {samples}x", info.id) };
-        let setup = |label: String, params: Params| {
-            let chosen = Chosen { technique, params };
-            Setup { label, samples, post: afterlight_techniques::Post::None, chosen }
-        };
-        let set_by_user = args.common.set.iter().any(|set| set.split('=').next().is_some_and(is_lights_key));
-        let other = Params::known(info).find(|one| one.key == LIGHTS_KEY && !set_by_user);
-        setups.push(setup(label.clone(), params.clone()));
-        if let Some(ParamKind::Choice { values }) = other.map(|one| one.kind) {
-            for value in values.iter().filter(|value| **value != params.text(info, LIGHTS_KEY)) {
-                let mut params = params.clone();
-                params.set(info, LIGHTS_KEY, value)?;
-                setups.push(setup(format!("{label}, lights={value}"), params));
-            }
-        }
-    }
-    Ok(setups)
-}
-
-/// Whether a name of `--set` is the parameter's, of all techniques or of one.
-fn is_lights_key(name: &str) -> bool {
-    name == LIGHTS_KEY || name.ends_with(&format!(".{LIGHTS_KEY}"))
+        Setup { label, samples, post: Post::None, chosen }
+    };
+    let chosen = session::choose("--techniques", &args.techniques, &args.common.set)?;
+    Ok(chosen.into_iter().map(setup).collect())
 }
 
 /// A number of lights, measured.
@@ -343,10 +330,10 @@ struct Measured {
 }
 
 fn measured(
-    args: &BenchArgs,
     session: &Session,
     setups: &[Setup],
     bounds: &Bounds,
+    frames: u32,
     progress: &Progress,
 ) -> Result<Measured, Failure> {
     let lights = session.scene.lights as f64;
@@ -385,7 +372,7 @@ fn measured(
 
     let running: Vec<&Setup> =
         setups.iter().zip(&results).filter(|(_, result)| result.is_none()).map(|(setup, _)| setup).collect();
-    let measured = measure(&session.renderer, &running, &workload, args.frames, progress)?.measured;
+    let measured = measure(&session.renderer, &running, &workload, frames, progress)?.measured;
     let mut measured = measured.into_iter().map(|one| one.result);
     let results: Vec<RunResult> =
         results.into_iter().filter_map(|result| result.or_else(|| measured.next())).collect();
@@ -685,19 +672,17 @@ mod tests {
     }
 
     #[test]
-    fn columns_are_all_techniques_and_both_ways_to_visit_lights() {
+    fn columns_are_all_techniques() {
         let labels = |arguments: &[&str]| {
             let setups = setups(&bench(arguments)).unwrap_or_else(|_| panic!("{arguments:?}"));
             setups.into_iter().map(|setup| setup.label).collect::<Vec<_>>()
         };
         let all = labels(&[]);
-        for technique in afterlight_techniques::registry() {
-            assert!(all.iter().any(|label| label.starts_with(technique.info().id)), "{all:?}");
-        }
-        let two = ["deferred-dedup 4x", "deferred-dedup 4x, lights=tiled"];
-        assert_eq!(labels(&["--techniques", "deferred-dedup"]), two);
-        let tiled = ["--techniques", "gbuffer-list", "--set", "lights=tiled", "--samples", "1"];
-        assert_eq!(labels(&tiled), ["gbuffer-list"]);
+        assert_eq!(all.len(), afterlight_techniques::registry().len());
+        let two = ["--techniques", "deferred-dedup,gbuffer-list"];
+        assert_eq!(labels(&two), ["deferred-dedup 4x", "gbuffer-list"]);
+        let more = [&two[..], &["--samples", "2"]].concat();
+        assert_eq!(labels(&more), ["deferred-dedup 2x", "gbuffer-list 2x"]);
     }
 
     #[test]
@@ -707,8 +692,8 @@ mod tests {
         };
         assert_eq!(evaluations("forward", &[]), 200.0 * 1000.0);
         assert_eq!(evaluations("tiled", &[]), 800.0);
-        assert_eq!(evaluations("gbuffer-list", &[]), 100.0 * 1000.0);
-        assert_eq!(evaluations("gbuffer-list", &[("lights", "tiled")]), 800.0);
+        assert_eq!(evaluations("gbuffer-list", &[("lights", "all")]), 100.0 * 1000.0);
+        assert_eq!(evaluations("gbuffer-list", &[("lights", "tiles")]), 800.0);
     }
 
     #[test]
