@@ -183,6 +183,8 @@ pub struct RasterPipelineDesc<'a> {
     pub stencil: Option<StencilState>,
     /// One for each colour attachment.
     pub blend: &'a [BlendState],
+    /// What the blend factors `CONSTANT_…` are: RGBA.
+    pub blend_constants: [f32; 4],
     /// Formats of the colour attachments, in order of location.
     pub color_formats: &'a [vk::Format],
     /// Format of the depth and stencil attachment.
@@ -261,6 +263,7 @@ struct RasterKey {
     depth_bias: bool,
     stencil: Option<StencilState>,
     blend: Vec<BlendState>,
+    blend_constant_bits: [u32; 4],
     color_formats: Vec<vk::Format>,
     depth_format: Option<vk::Format>,
     samples: u32,
@@ -407,6 +410,7 @@ impl Device {
                 depth_bias: desc.depth_bias,
                 stencil: desc.stencil,
                 blend: desc.blend.to_vec(),
+                blend_constant_bits: desc.blend_constants.map(f32::to_bits),
                 color_formats: desc.color_formats.to_vec(),
                 depth_format: desc.depth_format,
                 samples: desc.samples,
@@ -544,7 +548,9 @@ impl Device {
             .alpha_to_coverage_enable(desc.alpha_to_coverage);
         let depth_stencil = depth_stencil(desc);
         let blends: Vec<_> = desc.blend.iter().map(blend_attachment).collect();
-        let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&blends);
+        let blend = vk::PipelineColorBlendStateCreateInfo::default()
+            .attachments(&blends)
+            .blend_constants(desc.blend_constants);
         let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&[
             vk::DynamicState::VIEWPORT,
             vk::DynamicState::SCISSOR,

@@ -424,6 +424,7 @@ fn raster_draws_with_a_long_lived_set_stencil_and_resolve() {
             depth_bias: false,
             stencil: Some(StencilState { front: face, back: face }),
             blend: &[BlendState::OVERWRITE],
+            blend_constants: [0.0; 4],
             color_formats: &[vk::Format::R8G8B8A8_UNORM],
             depth_format: Some(depth_format),
             samples,

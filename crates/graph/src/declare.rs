@@ -352,6 +352,8 @@ pub struct RasterState {
     pub stencil: Option<StencilTest>,
     /// One entry a colour attachment, or empty: all replace.
     pub blend: Vec<Blend>,
+    /// What the blend factors `CONSTANT_…` are: RGBA.
+    pub blend_constants: [f32; 4],
     /// Faces that are dropped.
     pub cull: vk::CullModeFlags,
     /// Winding of front faces, as seen in the framebuffer.
@@ -375,6 +377,7 @@ impl RasterState {
             depth_bias_slope: 0.0,
             stencil: None,
             blend: Vec::new(),
+            blend_constants: [0.0; 4],
             cull: vk::CullModeFlags::NONE,
             front_face: vk::FrontFace::COUNTER_CLOCKWISE,
             layout: VertexLayout::default(),
@@ -423,6 +426,12 @@ impl RasterState {
     /// Sets the blending of every colour attachment, in order.
     pub fn blend(mut self, blend: impl Into<Vec<Blend>>) -> Self {
         self.blend = blend.into();
+        self
+    }
+
+    /// Sets what the blend factors `CONSTANT_…` are.
+    pub fn blend_constants(mut self, rgba: [f32; 4]) -> Self {
+        self.blend_constants = rgba;
         self
     }
 

@@ -805,6 +805,7 @@ impl Builder<'_> {
             depth_bias: is_biased(state),
             stencil: state.stencil.as_ref().map(stencil_state),
             blend: &blend,
+            blend_constants: state.blend_constants,
             color_formats: &formats,
             depth_format,
             samples: attached.map_or(1, |id| self.image(id).samples()),
@@ -1167,6 +1168,7 @@ fn same_pipeline(a: &RasterState, b: &RasterState) -> bool {
         && is_biased(a) == is_biased(b)
         && a.stencil == b.stencil
         && a.blend == b.blend
+        && a.blend_constants == b.blend_constants
         && a.layout == b.layout
 }
 
