@@ -362,6 +362,33 @@ pub fn light_list_forward(w: &Workload) -> Cost {
     }
 }
 
+/// LiD, section 4.7, as the paper gives it for packed indices of one float a pixel; others change the memory alone.
+pub fn light_indexed(w: &Workload, index_floats: f64) -> Cost {
+    Cost {
+        cmd: w.objects * w.object_command + w.lights * w.light_command,
+        proc: w.vertices() + w.light_volumes() + 4.0 * w.pixels * w.evaluation,
+        mem: (3.0 + index_floats) * w.pixels,
+        band: (w.vertex_traffic() + w.object_fragments * (w.object_fragment_traffic + 3.0))
+            + (w.volume_traffic() + w.light_fragments * (4.0 * w.light_fragment_traffic + 4.0)),
+    }
+}
+
+/// LiF, section 4.7, which names it and gives no formula: derived from LPP and LiD. The first pass is DPP's, depth alone, since
+/// indices need no normal; the second leaves indices as LiD's; the third draws the objects again. Of LiD's four floats beside the
+/// lights' the three of its G-buffer are gone.
+pub fn light_indexed_forward(w: &Workload, index_floats: f64) -> Cost {
+    Cost {
+        cmd: 2.0 * w.objects * w.object_command + w.lights * w.light_command,
+        proc: w.vertices() + w.light_volumes() + (w.vertices() + 4.0 * w.pixels * w.evaluation),
+        mem: (1.0 + index_floats) * w.pixels,
+        band: (w.vertex_traffic() + w.object_fragments)
+            + w.volume_traffic()
+            + (w.vertex_traffic()
+                + w.pixels * (w.object_fragment_traffic + 2.0)
+                + w.light_fragments * (4.0 * w.light_fragment_traffic + 1.0)),
+    }
+}
+
 /// D++, section 4.11. The paper numbers two terms 3; the second is pass 4.
 pub fn visibility_buffer(w: &Workload) -> Cost {
     let shared = w.light_fragments / w.pixels_a_tile * (1.0 - w.light_culling);
@@ -451,6 +478,14 @@ mod tests {
         assert_eq!(
             light_list_forward(&lists),
             Cost { cmd: 23.0, proc: 244.0, mem: 40.0 + 80.0, band: 250.0 + 44.0 + 620.0 }
+        );
+        assert_eq!(
+            light_indexed(&w, 1.0),
+            Cost { cmd: 13.0, proc: 124.0 + 160.0, mem: 160.0, band: 600.0 + 24.0 + 640.0 }
+        );
+        assert_eq!(
+            light_indexed_forward(&w, 2.0),
+            Cost { cmd: 23.0, proc: 224.0 + 160.0, mem: 120.0, band: 250.0 + 24.0 + (480.0 + 580.0) }
         );
         let four = Workload { shading_samples: 4.0, expected_samples: 1.5, ..w };
         assert_eq!(

@@ -32,6 +32,7 @@ pub mod gbuffer;
 pub mod geometry;
 pub mod indirect;
 pub mod light_bvh;
+pub mod light_indices;
 pub mod light_lists;
 pub mod light_step;
 pub mod light_view;

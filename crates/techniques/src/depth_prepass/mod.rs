@@ -2,7 +2,9 @@
 
 // ORDER: 30
 
-use afterlight_graph::{DepthTest, Graph, ImageHandle, Load, StencilFace, StencilTest, gpu::vk};
+use afterlight_graph::{
+    DepthTest, Graph, ImageHandle, Load, RasterPass, StencilFace, StencilTest, gpu::vk,
+};
 
 use crate::{
     ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError,
@@ -78,6 +80,35 @@ pub(crate) fn draw_depth(
     surfaces.draw(frame, &mut pass);
     pass.finish();
     Ok(depth)
+}
+
+/// Declares the pass `technique/shade`: surfaces where `depth`, of [`draw_depth`], is equal, each shaded by `shader`, which ends in
+/// `shade_visible.glsl`, and its variant `#mask`, with these specialization constants. `bind_lights` binds what leads to the lights.
+/// Returns radiance, the samples of a pixel averaged.
+///
+/// # Errors
+/// A shader that is not compiled in.
+pub(crate) fn shade_visible(
+    graph: &mut Graph,
+    frame: &Frame<'_>,
+    (technique, shader): (&str, &str),
+    depth: ImageHandle,
+    constants: Vec<(String, u32)>,
+    bind_lights: impl FnOnce(&mut RasterPass<'_>),
+) -> Result<ImageHandle, TechniqueError> {
+    let target = RadianceTarget::new(graph, frame, technique);
+    let mut shaded = Surfaces::shaded(frame, shader, &format!("{shader}#mask"))?
+        .depth(DepthTest::EQUAL)
+        .stencil(FIRST_FRAGMENT, 1);
+    shaded.constants = constants;
+    let mut pass = graph.raster(&format!("{technique}/shade"));
+    frame.bind_scene(&mut pass);
+    bind_lights(&mut pass);
+    let radiance = target.attach(frame, &mut pass);
+    let _depth = pass.stencil(depth, Load::Keep);
+    shaded.draw(frame, &mut pass);
+    pass.finish();
+    Ok(radiance)
 }
 
 impl Technique for DepthPrepass {

@@ -10,7 +10,7 @@
 //!
 //! 21 bytes a pixel, 8 of them the accumulation (Petrescu et al. 2016, Figure 1).
 
-use afterlight_graph::{Graph, ImageHandle, Load, gpu::vk};
+use afterlight_graph::{ComputePass, Graph, ImageHandle, Load, gpu::vk};
 
 use crate::{
     error::TechniqueError,
@@ -87,12 +87,28 @@ pub fn shade(
     filled: GBuffer,
     step: &LightStep,
 ) -> Result<ImageHandle, TechniqueError> {
-    let mut pass = frame.compute(graph, &format!("{technique}/shade"), &frame.shader("gbuffer/shade.comp")?);
+    shade_by(graph, frame, (technique, "gbuffer/shade.comp"), filled, |pass| {
+        step.bind(frame, pass);
+        for (constant, value) in step.constants() {
+            pass.constant(&constant, value);
+        }
+    })
+}
+
+/// The same by a compute shader that ends in `shade_pixels.glsl`; `bind_lights` binds what leads to the lights.
+///
+/// # Errors
+/// A shader that is not compiled in.
+pub(crate) fn shade_by(
+    graph: &mut Graph,
+    frame: &Frame<'_>,
+    (technique, shader): (&str, &str),
+    filled: GBuffer,
+    bind_lights: impl FnOnce(&mut ComputePass<'_>),
+) -> Result<ImageHandle, TechniqueError> {
+    let mut pass = frame.compute(graph, &format!("{technique}/shade"), &frame.shader(shader)?);
     bind(&mut pass, &filled);
-    step.bind(frame, &mut pass);
-    for (constant, value) in step.constants() {
-        pass.constant(&constant, value);
-    }
+    bind_lights(&mut pass);
     let radiance = pass.write("hdr", filled.accumulation);
     pass.dispatch(frame.groups(8));
     pass.finish();

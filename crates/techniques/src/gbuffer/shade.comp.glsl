@@ -1,24 +1,6 @@
-// Shades the G-buffer, a thread a pixel, by the lights that its surface visits (light_step/).
-//
-// In: the G-buffer, what light_step/radiance.glsl reads; hdr: accumulation, read and written. Dispatch: 8x8 groups.
+// Shades the G-buffer by the lights that its surfaces visit (light_step/).
+// In: what light_step/radiance.glsl reads, and as below.
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#include "gbuffer.glsl"
 #include "light_step/radiance.glsl"
-
-layout(local_size_x = 8, local_size_y = 8) in;
-layout(set = 0, binding = 12, rgba16f) uniform image2D hdr;
-
-void main() {
-    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
-    if (any(greaterThanEqual(gl_GlobalInvocationID.xy, frame.size_px))) {
-        return;
-    }
-    float depth = texelFetch(gbuffer_depth, pixel, 0).r;
-    Surface s;
-    if (!gbuffer_load(pixel, depth, s)) {
-        return;
-    }
-    vec3 radiance = lights_radiance(shading_point(s), uvec2(pixel), distance_from_depth(depth));
-    imageStore(hdr, pixel, vec4(imageLoad(hdr, pixel).rgb + radiance, 1.0));
-}
+#include "gbuffer/shade_pixels.glsl"

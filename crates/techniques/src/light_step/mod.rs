@@ -1,17 +1,15 @@
 //! The stage by which surfaces find their lights, for every technique that shades a surface at once: the parameter `lights`, what it
 //! builds, and what `radiance.glsl` reads of it.
 
-use afterlight_graph::{DepthTest, Graph, ImageHandle, Load};
+use afterlight_graph::{Graph, ImageHandle};
 
 use crate::{
     Info, ParamInfo, ParamKind, Params, TechniqueError,
     clusters::{self, CellLists, Division, Grid, Surfaces},
-    depth_prepass::{FIRST_FRAGMENT, draw_depth},
+    depth_prepass::{draw_depth, shade_visible},
     frame::{Frame, Slots},
-    geometry,
     light_bvh::{self, LightBvh},
     light_lists::{self, LightLists},
-    radiance_target::RadianceTarget,
 };
 
 /// Lights up to which a loop over all of them costs less than any structure, by `auto`.
@@ -165,20 +163,8 @@ pub(crate) fn shade_forward(
     depth: ImageHandle,
     step: &LightStep,
 ) -> Result<ImageHandle, TechniqueError> {
-    let target = RadianceTarget::new(graph, frame, technique);
-    let mut shaded =
-        geometry::Surfaces::shaded(frame, "light_step/forward.frag", "light_step/forward.frag#mask")?
-            .depth(DepthTest::EQUAL)
-            .stencil(FIRST_FRAGMENT, 1);
-    shaded.constants = step.constants();
-    let mut pass = graph.raster(&format!("{technique}/shade"));
-    frame.bind_scene(&mut pass);
-    step.bind(frame, &mut pass);
-    let radiance = target.attach(frame, &mut pass);
-    let _depth = pass.stencil(depth, Load::Keep);
-    shaded.draw(frame, &mut pass);
-    pass.finish();
-    Ok(radiance)
+    let shader = (technique, "light_step/forward.frag");
+    shade_visible(graph, frame, shader, depth, step.constants(), |pass| step.bind(frame, pass))
 }
 
 /// A depth pre-pass, lists of lights of the cells that it shows, and forward shading by them.

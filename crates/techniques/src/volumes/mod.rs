@@ -100,6 +100,19 @@ pub fn volume_state(
     state(frame, "volumes/volume.vert", fragment, cull, blend).map(|s| s.layout(layout()))
 }
 
+/// As [`volume_state`], with a table of lights, the slot `LightOrder`, whose places are the instances.
+///
+/// # Errors
+/// A shader that is not compiled in.
+pub fn ordered_state(
+    frame: &Frame<'_>,
+    fragment: &str,
+    cull: vk::CullModeFlags,
+    blend: Vec<Blend>,
+) -> Result<RasterState, TechniqueError> {
+    state(frame, "volumes/volume.vert#ordered", Some(fragment), cull, blend).map(|s| s.layout(layout()))
+}
+
 fn state(
     frame: &Frame<'_>,
     vertex: &str,
@@ -116,7 +129,7 @@ fn state(
     Ok(state)
 }
 
-/// A draw of `count` volumes from light `first` on.
+/// A draw of `count` volumes from light, or place in the table, `first` on.
 pub fn volume_draw<'a>(frame: &'a Frame<'_>, state: RasterState, first: u32, count: u32) -> Draw<'a> {
     let call = DrawCall::Indexed {
         indices: ICOSPHERE_INDICES,

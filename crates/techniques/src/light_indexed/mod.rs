@@ -1,0 +1,69 @@
+//! `light-indexed`: a G-buffer, the indices of the four nearest lights a pixel, then a compute pass that visits those.
+
+// ORDER: 51
+
+use afterlight_graph::{Graph, ImageHandle, gpu::vk};
+
+use crate::{
+    Answers, AppendixA, Frame, Info, Params, Source, Technique, TechniqueError,
+    cost::{self, Cost, Workload},
+    gbuffer, light_indices,
+};
+
+/// The technique.
+pub static TECHNIQUE: LightIndexed = LightIndexed;
+
+/// See the module.
+pub struct LightIndexed;
+
+static INFO: Info = Info {
+    id: "light-indexed",
+    title: "Light indexed deferred shading",
+    summary: "Surfaces fill a G-buffer; light volumes are blended into the packed indices of the four nearest lights a pixel, which are then shaded.",
+    sources: &[
+        Source { key: "petrescu-2016", section: "2.2" },
+        Source { key: "petrescu-2016", section: "4.7" },
+        Source { key: "trebilco-2009", section: "all" },
+    ],
+    answers: Answers {
+        surface: "G-buffer, 1 sample",
+        lights: "four packed indices, by light volumes",
+        schedule: "compute, a thread a pixel",
+        resolve: "one sample",
+    },
+    appendix_a: AppendixA {
+        id: "LiD",
+        intersect: "exp",
+        transparency: "n",
+        hardware_msaa: "n",
+        light_access: "rand",
+        material_access: "seq",
+        rates_decoupled: "n, n",
+    },
+    exactness: light_indices::EXACTNESS,
+    params: &[light_indices::INDEX_PARTS],
+    needs: &[],
+    samples: &[1],
+    tessellation: true,
+    views: &[],
+};
+
+impl Technique for LightIndexed {
+    fn info(&self) -> &Info {
+        &INFO
+    }
+
+    fn predict(&self, workload: &Workload, params: &Params) -> Cost {
+        cost::light_indexed(workload, light_indices::floats(workload, params, &INFO))
+    }
+
+    fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
+        let filled = gbuffer::fill(graph, frame, INFO.id, vk::Format::D32_SFLOAT)?;
+        let lights = light_indices::build(graph, frame, &INFO, &filled.depth)?;
+        gbuffer::shade_by(graph, frame, (INFO.id, "light_indexed/shade.comp"), filled, |pass| {
+            lights.bind(pass);
+            let (constant, value) = lights.constant();
+            pass.constant(constant, value);
+        })
+    }
+}

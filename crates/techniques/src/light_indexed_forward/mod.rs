@@ -1,0 +1,69 @@
+//! `light-indexed-forward`: depth first, the indices of the four nearest lights a pixel, then forward shading that visits those.
+
+// ORDER: 53
+
+use afterlight_graph::{Graph, ImageHandle};
+
+use crate::{
+    Answers, AppendixA, Frame, Info, Params, Source, Technique, TechniqueError,
+    cost::{self, Cost, Workload},
+    depth_prepass::{draw_depth, shade_visible},
+    light_indices,
+};
+
+/// The technique.
+pub static TECHNIQUE: LightIndexedForward = LightIndexedForward;
+
+/// See the module.
+pub struct LightIndexedForward;
+
+static INFO: Info = Info {
+    id: "light-indexed-forward",
+    title: "Light indexed forward shading",
+    summary: "A depth pre-pass; light volumes are blended into the packed indices of the four nearest lights a pixel; then each surface visits those.",
+    sources: &[
+        Source { key: "petrescu-2016", section: "2.2" },
+        Source { key: "petrescu-2016", section: "4.7" },
+        Source { key: "trebilco-2009", section: "all" },
+    ],
+    answers: Answers {
+        surface: "nothing (depth)",
+        lights: "four packed indices, by light volumes",
+        schedule: "fragment shader",
+        resolve: "one sample",
+    },
+    appendix_a: AppendixA {
+        id: "LiF",
+        intersect: "exp",
+        transparency: "y",
+        hardware_msaa: "y",
+        light_access: "rand",
+        material_access: "seq",
+        rates_decoupled: "n, n",
+    },
+    exactness: light_indices::EXACTNESS,
+    params: &[light_indices::INDEX_PARTS],
+    needs: &[],
+    samples: &[1],
+    tessellation: true,
+    views: &[],
+};
+
+impl Technique for LightIndexedForward {
+    fn info(&self) -> &Info {
+        &INFO
+    }
+
+    fn predict(&self, workload: &Workload, params: &Params) -> Cost {
+        cost::light_indexed_forward(workload, light_indices::floats(workload, params, &INFO))
+    }
+
+    fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
+        let depth = draw_depth(graph, frame, INFO.id)?;
+        let lights = light_indices::build(graph, frame, &INFO, &depth)?;
+        let (name, images) = lights.constant();
+        let constants = vec![(name.to_owned(), images)];
+        let shader = (INFO.id, "light_indexed_forward/forward.frag");
+        shade_visible(graph, frame, shader, depth, constants, |pass| lights.bind(pass))
+    }
+}
