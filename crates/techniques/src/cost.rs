@@ -161,6 +161,22 @@ pub fn light_prepass(w: &Workload) -> Cost {
     }
 }
 
+/// The project's own, for the hybrid that section 4.5 names without a formula: a share of the objects (and of their vertices,
+/// fragments and pixels) goes through LPP, the others through D. Its memory is D's: LPP's floats are among them.
+pub fn hybrid(w: &Workload, prepass_share: f64) -> Cost {
+    let (prepass, deferred) = (prepass_share, 1.0 - prepass_share);
+    Cost {
+        cmd: (1.0 + prepass) * w.objects * w.object_command + w.lights * w.light_command,
+        proc: w.vertices() + (w.light_volumes() + w.light_fragments * w.evaluation) + prepass * w.vertices(),
+        mem: 4.0 * w.pixels,
+        band: (w.vertex_traffic()
+            + w.object_fragments * (deferred * (w.object_fragment_traffic + 3.0) + prepass * 2.0))
+            + (w.volume_traffic() + w.light_fragments * (w.light_fragment_traffic + 3.0))
+            + (prepass * (w.vertex_traffic() + w.pixels * (w.object_fragment_traffic + 2.0))
+                + deferred * 3.0 * w.pixels),
+    }
+}
+
 /// DAA, section 4.4.
 pub fn deferred_msaa(w: &Workload) -> Cost {
     let s = w.shading_samples;
@@ -445,6 +461,18 @@ mod tests {
             light_prepass(&w),
             Cost { cmd: 23.0, proc: 100.0 + 44.0 + 100.0, mem: 120.0, band: 300.0 + 224.0 + 480.0 }
         );
+        // A quarter of 10 objects twice; 50 fragments × (0.75 × 8 + 0.25 × 2); 0.25 × (200 + 40 × 7) + 0.75 × 120.
+        assert_eq!(
+            hybrid(&w, 0.25),
+            Cost {
+                cmd: 15.5,
+                proc: 144.0 + 25.0,
+                mem: 160.0,
+                band: (200.0 + 325.0) + 224.0 + (120.0 + 90.0)
+            }
+        );
+        assert_eq!(hybrid(&w, 0.0), deferred(&w));
+        assert_eq!(hybrid(&w, 1.0), Cost { mem: 160.0, ..light_prepass(&w) });
         assert_eq!(
             tiled_deferred(&w),
             Cost { cmd: 13.0, proc: 144.0, mem: 120.0, band: 600.0 + 25.0 + 167.0 }

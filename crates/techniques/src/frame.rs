@@ -7,8 +7,15 @@ use afterlight_graph::{
 use afterlight_shader::Shader;
 
 use crate::{
-    SHADERS, capacity::Capacities, error::TechniqueError, indirect::Rsm, lights::LightList, params::Params,
-    scene_gpu::SceneGpu, shadow::Shadow, view,
+    SHADERS,
+    capacity::Capacities,
+    error::TechniqueError,
+    indirect::Rsm,
+    lights::LightList,
+    params::Params,
+    scene_gpu::{BUCKETS, SceneGpu},
+    shadow::Shadow,
+    view,
 };
 
 /// A frame to be recorded: the scene on the device, its buffers imported into the graph, sizes and parameters.
@@ -39,6 +46,8 @@ pub struct Frame<'a> {
     pub(crate) extra_shaders: &'a [Shader],
     pub(crate) device: &'a gpu::Device,
     pub(crate) capacities: &'a Capacities,
+    /// Draws that the eye has in view, by bucket, in drawing order.
+    pub(crate) visible: &'a [Vec<u32>; BUCKETS],
 }
 
 /// Buffers of the scene and the frame as the graph knows them.
@@ -120,7 +129,8 @@ impl Frame<'_> {
         self.view == view
     }
 
-    /// Brings a small table that a technique made on the CPU into the graph, as a storage buffer.
+    /// Brings a small table that a technique made on the CPU into the graph, as a storage buffer that indirect calls
+    /// may read too.
     ///
     /// # Errors
     /// The device.
@@ -134,7 +144,7 @@ impl Frame<'_> {
         let buffer = self.device.create_buffer(&gpu::BufferDesc {
             name,
             bytes: size_of_val(words) as u64,
-            usage: vk::BufferUsageFlags::STORAGE_BUFFER,
+            usage: vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::INDIRECT_BUFFER,
             memory: gpu::MemoryKind::Upload,
         })?;
         buffer.write(0, bytemuck::cast_slice(words))?;

@@ -335,6 +335,7 @@ impl Renderer {
             extra_shaders: &self.extra_shaders,
             device: &self.device,
             capacities,
+            visible: &draws.visible,
         };
         indirect::record(&mut graph, &mut frame, settings)?;
         shadow::record(&mut graph, &mut frame, settings)?;

@@ -30,6 +30,31 @@ pub(crate) struct DrawInfo {
     pub index_count: u32,
     pub first_index: u32,
     pub first_vertex: u32,
+    pub fetches: TextureFetches,
+}
+
+/// Textures that a fragment of a material reads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct TextureFetches {
+    /// For its surface.
+    pub all: u8,
+    /// For what the lobes of its BRDF need alone: normal, roughness, and alpha where it is masked.
+    pub lobe: u8,
+}
+
+impl TextureFetches {
+    fn new(material: &Material) -> Self {
+        let count = |textures: &[&Option<TextureRef>]| textures.iter().filter(|t| t.is_some()).count() as u8;
+        let m = material;
+        let lobe = [&m.normal_texture, &m.metallic_roughness_texture];
+        let colors = [&m.occlusion_texture, &m.emissive_texture];
+        let masked = matches!(m.alpha_mode, AlphaMode::Mask { .. });
+        let base_color = count(&[&m.base_color_texture]);
+        Self {
+            all: count(&lobe) + count(&colors) + base_color,
+            lobe: count(&lobe) + base_color * u8::from(masked),
+        }
+    }
 }
 
 /// Bucket of a draw: alpha-masked 4, double-sided 2, mirrored 1.
@@ -269,6 +294,7 @@ impl DrawTable {
                         index_count: (mesh.index_count - first).min(DRAW_TRIANGLES * 3),
                         first_index,
                         first_vertex: mesh.first_vertex,
+                        fetches: TextureFetches::new(material),
                     },
                     names.clone(),
                 ));

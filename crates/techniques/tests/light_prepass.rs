@@ -8,7 +8,9 @@ use afterlight_techniques::{
     scene::{self, Light, LightKind, Scene},
     shader::Shader,
 };
-use common::{Stage, compiled, image_of, lights_of_each_kind, psnr, radiance_of, sources};
+use common::{
+    Stage, compiled, compiled_with_header, image_of, lights_of_each_kind, psnr, radiance_of, sources,
+};
 use glam::Vec3;
 
 /// Least PSNR to `forward` of what the sums make up, dB: more than the technique's, since grazing light is little of an image.
@@ -98,10 +100,13 @@ fn sums_beyond_their_format_stay_numbers() {
         radiance.iter().flatten().filter(|c| c.is_nan()).count()
     };
     assert_eq!(not_numbers(None), 0);
-    let unbounded = mutant(
-        "material.frag",
-        "min(texelFetch(light, ivec2(gl_FragCoord.xy), 0).rgb, vec3(65504.0))",
-        "texelFetch(light, ivec2(gl_FragCoord.xy), 0).rgb",
+    let unbounded = compiled_with_header(
+        "light_prepass/material.frag",
+        (&sources(), "light_prepass/sums.glsl"),
+        &[(
+            "min(texelFetch(light, ivec2(gl_FragCoord.xy), 0).rgb, vec3(65504.0))",
+            "texelFetch(light, ivec2(gl_FragCoord.xy), 0).rgb",
+        )],
     );
     assert!(not_numbers(Some(unbounded)) > 0, "no sum is beyond its format: the test shows nothing");
 }

@@ -128,7 +128,7 @@ fn draw_lights(frame: &Frame<'_>, pass: &mut RasterPass<'_>) -> Result<(), Techn
 }
 
 /// Pixels that a box may cover: all where it reaches behind the eye's plane, none where it lies outside the image.
-fn screen_rect(clip_from_world: Mat4, bounds: &Aabb, whole: Rect) -> Option<Rect> {
+pub(crate) fn screen_rect(clip_from_world: Mat4, bounds: &Aabb, whole: Rect) -> Option<Rect> {
     let corners = (0..8).map(|i| {
         let pick = glam::BVec3::new(i & 1 != 0, i & 2 != 0, i & 4 != 0);
         clip_from_world * Vec3::select(pick, bounds.max, bounds.min).extend(1.0)

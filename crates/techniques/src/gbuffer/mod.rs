@@ -10,7 +10,7 @@
 //!
 //! 21 bytes a pixel, 8 of them the accumulation (Petrescu et al. 2016, Figure 1).
 
-use afterlight_graph::{ComputePass, Graph, ImageHandle, Load, gpu::vk};
+use afterlight_graph::{ComputePass, Graph, ImageHandle, Load, RasterPass, gpu::vk};
 
 use crate::{
     error::TechniqueError,
@@ -43,6 +43,18 @@ pub fn fill(
     technique: &str,
     depth_format: vk::Format,
 ) -> Result<GBuffer, TechniqueError> {
+    let surfaces = Surfaces::shaded(frame, "gbuffer/gbuffer.frag", "gbuffer/gbuffer.frag#mask")?;
+    Ok(fill_by(graph, frame, technique, depth_format, |pass| surfaces.draw(frame, pass)))
+}
+
+/// Declares the pass `technique/gbuffer` with other draws than those of all surfaces.
+pub(crate) fn fill_by(
+    graph: &mut Graph,
+    frame: &Frame<'_>,
+    technique: &str,
+    depth_format: vk::Format,
+    draw: impl FnOnce(&mut RasterPass<'_>),
+) -> GBuffer {
     let image = |graph: &mut Graph, name: &str, format| {
         graph.image(&format!("{technique}/{name}"), frame.image_info(format))
     };
@@ -52,7 +64,6 @@ pub fn fill(
     let roughness = image(graph, "roughness", vk::Format::R8_UNORM);
     let depth = image(graph, "depth", depth_format);
 
-    let surfaces = Surfaces::shaded(frame, "gbuffer/gbuffer.frag", "gbuffer/gbuffer.frag#mask")?;
     let mut pass = graph.raster(&format!("{technique}/gbuffer"));
     frame.bind_scene(&mut pass);
     let filled = GBuffer {
@@ -63,9 +74,9 @@ pub fn fill(
         roughness: pass.color(roughness, Load::DontCare),
         depth: pass.depth(depth, Load::Clear(0.0)),
     };
-    surfaces.draw(frame, &mut pass);
+    draw(&mut pass);
     pass.finish();
-    Ok(filled)
+    filled
 }
 
 /// Binds what `include/gbuffer.glsl` reads.

@@ -4,8 +4,10 @@
 //! call over the draws in view. Masked surfaces have pipelines of their own, since `discard` keeps early depth tests from
 //! opaque ones.
 
+use std::ops::Range;
+
 use afterlight_graph::{
-    Blend, DepthTest, Draw, DrawCall, RasterPass, RasterState, Rect, StencilTest, gpu::vk,
+    Blend, BufferHandle, DepthTest, Draw, DrawCall, RasterPass, RasterState, Rect, StencilTest, gpu::vk,
 };
 use afterlight_graph::{VertexAttribute, VertexLayout, VertexStream};
 use afterlight_shader::Shader;
@@ -201,6 +203,27 @@ impl Surfaces {
             };
             pass.draw(self.bucket_draw(frame, bucket, call));
         }
+    }
+
+    /// Adds some of the draws in view to a pass: a bucket's, by their places in its order. Word `word` of `counts` is their number:
+    /// lavapipe (Mesa 22.3) gives an indirect call without a count the count of the call before.
+    pub(crate) fn draw_some(
+        &self,
+        frame: &Frame<'_>,
+        pass: &mut RasterPass<'_>,
+        (bucket, places): (Bucket, &Range<u32>),
+        (counts, word): (&BufferHandle, usize),
+    ) {
+        let first = frame.scene.bucket_first[bucket.0] + places.start;
+        let call = DrawCall::IndexedIndirectCount {
+            buffer: &frame.buffers.commands,
+            offset: COMMAND_BYTES * u64::from(first),
+            count_buffer: counts,
+            count_offset: 4 * word as u64,
+            max: places.end - places.start,
+            stride: COMMAND_BYTES as u32,
+        };
+        pass.draw(self.bucket_draw(frame, bucket, call));
     }
 
     /// A draw of surfaces of one bucket by any call whose first instances are draw numbers.

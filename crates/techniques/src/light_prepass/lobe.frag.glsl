@@ -1,13 +1,17 @@
 // Keeps of the nearest surface what a light's lobes need and no colour (Petrescu et al. 2016, section 4.5, first pass).
 //
-// Out: 0 normal, world space, octahedral, RG16 unsigned normalised; 1 roughness, R8, 0 where the surface takes no light.
+// Out: 0 normal, world space, octahedral, RG16 unsigned normalised; 1 roughness, R8, 0 where the surface takes no light; or at
+// FIRST_OUTPUT and after it.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shading.glsl"
 #include "surface_in.glsl"
 
-layout(location = 0) out vec2 normal_oct;
-layout(location = 1) out float roughness;
+#ifndef FIRST_OUTPUT
+#define FIRST_OUTPUT 0
+#endif
+layout(location = FIRST_OUTPUT) out vec2 normal_oct;
+layout(location = FIRST_OUTPUT + 1) out float roughness;
 
 void main() {
     MaterialData m = load_material(draw_material.y);

@@ -57,7 +57,7 @@ struct LobeBuffer {
 }
 
 /// The parts of light that `lobes()` of `shading.glsl` tells apart, RGBA16F, by the slots of `material.frag`.
-const SUMS: [&str; 3] = ["diffuse_light", "specular_light", "grazing_light"];
+pub(crate) const SUMS: [&str; 3] = ["diffuse_light", "specular_light", "grazing_light"];
 
 impl Technique for LightPrepass {
     fn info(&self) -> &Info {
@@ -70,7 +70,8 @@ impl Technique for LightPrepass {
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let filled = fill(graph, frame)?;
-        let sums = gather_lights(graph, frame, &filled)?;
+        let surfaces = [&filled.depth, &filled.normal, &filled.roughness];
+        let sums = gather_lights(graph, frame, INFO.id, surfaces)?;
         apply_materials(graph, frame, filled.depth, &sums)
     }
 }
@@ -95,23 +96,24 @@ fn fill(graph: &mut Graph, frame: &Frame<'_>) -> Result<LobeBuffer, TechniqueErr
     Ok(filled)
 }
 
-/// Second pass: the sums over all lights of what needs no colour of the surface.
-fn gather_lights(
+/// Second pass, `technique/lights`: the sums over all lights of what needs no colour of the surface.
+pub(crate) fn gather_lights(
     graph: &mut Graph,
     frame: &Frame<'_>,
-    filled: &LobeBuffer,
+    technique: &str,
+    [depth, normal, roughness]: [&ImageHandle; 3],
 ) -> Result<[ImageHandle; 3], TechniqueError> {
     let sums = SUMS.map(|slot| {
-        let name = format!("light-prepass/{}", slot.replace('_', " "));
+        let name = format!("{technique}/{}", slot.replace('_', " "));
         graph.image(&name, frame.image_info(vk::Format::R16G16B16A16_SFLOAT))
     });
-    let mut pass = graph.raster("light-prepass/lights");
+    let mut pass = graph.raster(&format!("{technique}/lights"));
     frame.bind_scene(&mut pass);
-    pass.read("gbuffer_depth", &filled.depth);
-    pass.read("gbuffer_normal", &filled.normal);
-    pass.read("gbuffer_roughness", &filled.roughness);
+    pass.read("gbuffer_depth", depth);
+    pass.read("gbuffer_normal", normal);
+    pass.read("gbuffer_roughness", roughness);
     let sums = sums.map(|sum| pass.color(sum, Load::Clear([0.0; 4])));
-    pass.depth_read_only(&filled.depth);
+    pass.depth_read_only(depth);
     volumes::draw_all(frame, &mut pass, "light_prepass/light.frag", SUMS.len())?;
     pass.finish();
     Ok(sums)

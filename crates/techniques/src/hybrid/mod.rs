@@ -1,0 +1,209 @@
+//! `hybrid`: deferred shading or a light pre-pass, chosen draw by draw from the overdraw that is predicted.
+
+// ORDER: 56
+
+use afterlight_graph::{
+    Blend, BufferHandle, DepthTest, Graph, ImageHandle, Load, RasterPass, StencilFace, StencilTest, gpu::vk,
+};
+
+use crate::{
+    Answers, AppendixA, Exactness, Frame, Info, Need, ParamInfo, ParamKind, Params, Source, Technique,
+    TechniqueError,
+    cost::{self, Cost, Workload},
+    depth_prepass::FIRST_FRAGMENT,
+    gbuffer::{self, GBuffer},
+    geometry::Surfaces,
+    light_prepass::{self, SUMS},
+    multisample,
+};
+use paths::{Path, Run};
+
+mod paths;
+
+/// The technique.
+pub static TECHNIQUE: Hybrid = Hybrid;
+
+/// See the module.
+pub struct Hybrid;
+
+/// Which path draws take.
+const PATH: ParamInfo = ParamInfo {
+    key: "path",
+    summary: "path of each draw: the one that is predicted to read and write less, or one for all",
+    kind: ParamKind::Choice { values: &["predicted", "deferred", "prepass"] },
+    default: "predicted",
+};
+
+/// Bias of the choice.
+const PREPASS_WEIGHT: ParamInfo = ParamInfo {
+    key: "prepass-weight",
+    summary: "factor on the traffic that is predicted for a draw on the light pre-pass path: below 1 more draws take it",
+    kind: ParamKind::Number { min: 0.0, max: 1000.0 },
+    default: "1",
+};
+
+static INFO: Info = Info {
+    id: "hybrid",
+    title: "Hybrid of deferred shading and light pre-pass",
+    summary: "Each draw fills the G-buffer, or leaves normal and roughness and is drawn again for its colours: what is predicted to cost less.",
+    sources: &[
+        Source { key: "petrescu-2016", section: "2.1" },
+        Source { key: "petrescu-2016", section: "4.5" },
+        Source { key: "hoef-2013", section: "all" },
+    ],
+    answers: Answers {
+        surface: "G-buffer, colours of some surfaces left out",
+        lights: "light volumes",
+        schedule: "fragment shader",
+        resolve: "one sample",
+    },
+    appendix_a: AppendixA {
+        id: "D/LPP",
+        intersect: "imp",
+        transparency: "n",
+        hardware_msaa: "n",
+        light_access: "seq",
+        material_access: "rand",
+        rates_decoupled: "n, n",
+    },
+    exactness: Exactness::Exact { min_psnr_db: 50.0 },
+    params: &[PATH, PREPASS_WEIGHT],
+    needs: &[Need { name: "independent blending", test: |features| features.independent_blend }],
+    samples: &[1],
+    tessellation: true,
+    views: &[],
+};
+
+/// Names the owner of a pixel: the stencil reference of what is nearest so far.
+const OWNER: StencilTest = {
+    let face = StencilFace {
+        compare: vk::CompareOp::ALWAYS,
+        fail: vk::StencilOp::KEEP,
+        depth_fail: vk::StencilOp::KEEP,
+        pass: vk::StencilOp::REPLACE,
+    };
+    StencilTest { front: face, back: face, compare_mask: 0xff, write_mask: 0xff }
+};
+
+/// Passes in pixels of one owner.
+const OWNED: StencilTest = {
+    let face = StencilFace { compare: vk::CompareOp::EQUAL, ..StencilFace::KEEP };
+    StencilTest { front: face, back: face, compare_mask: 0xff, write_mask: 0 }
+};
+
+/// Stencil of a pixel whose colours are known: by the G-buffer, or since its surface was drawn again.
+const COLORED: u32 = 1;
+/// Stencil of a pixel whose surface is to be drawn again.
+const COLORLESS: u32 = 0;
+
+/// The draws in view, in order.
+struct Draws {
+    runs: Vec<Run>,
+    /// Length of each run.
+    counts: BufferHandle,
+}
+
+impl Draws {
+    fn take(&self, path: Path) -> bool {
+        self.runs.iter().any(|run| run.path == path)
+    }
+
+    /// Adds all draws to a pass, each path's as said; `None` leaves them out.
+    fn draw<'s>(
+        &self,
+        frame: &Frame<'_>,
+        pass: &mut RasterPass<'_>,
+        surfaces: impl Fn(Path) -> Option<&'s Surfaces>,
+    ) {
+        for (i, run) in self.runs.iter().enumerate() {
+            if let Some(surfaces) = surfaces(run.path) {
+                surfaces.draw_some(frame, pass, (run.bucket, &run.places), (&self.counts, i));
+            }
+        }
+    }
+}
+
+impl Technique for Hybrid {
+    fn info(&self) -> &Info {
+        &INFO
+    }
+
+    /// The model's objects are alike, so all take the path that reads and writes less.
+    fn predict(&self, workload: &Workload, params: &Params) -> Cost {
+        let [deferred, prepass] = [0.0, 1.0].map(|share| cost::hybrid(workload, share));
+        let weight = f64::from(params.get(&PREPASS_WEIGHT).parse::<f32>().unwrap_or(1.0));
+        match params.get(&PATH) {
+            "deferred" => deferred,
+            "prepass" => prepass,
+            _ if prepass.band * weight < deferred.band => prepass,
+            _ => deferred,
+        }
+    }
+
+    fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
+        let runs = match frame.params.get(&PATH) {
+            "deferred" => paths::one_path(frame, Path::Deferred),
+            "prepass" => paths::one_path(frame, Path::Prepass),
+            _ => paths::predicted(frame, frame.params.number(&INFO, PREPASS_WEIGHT.key)),
+        };
+        let lengths: Vec<u32> = runs.iter().map(|run| run.places.len() as u32).collect();
+        let counts = frame.table(graph, "hybrid draw counts", &lengths)?;
+        let draws = Draws { runs, counts };
+        let filled = fill(graph, frame, &draws)?;
+        let surfaces = [&filled.depth, &filled.normal, &filled.roughness];
+        let sums = light_prepass::gather_lights(graph, frame, INFO.id, surfaces)?;
+        apply_materials(graph, frame, filled, &sums, &draws)
+    }
+}
+
+/// First pass: draws fill the G-buffer as a whole, or but normal and roughness, in the order of all techniques.
+fn fill(graph: &mut Graph, frame: &Frame<'_>, draws: &Draws) -> Result<GBuffer, TechniqueError> {
+    let mut whole =
+        Surfaces::shaded(frame, "gbuffer/gbuffer.frag", "gbuffer/gbuffer.frag#mask")?.stencil(OWNER, COLORED);
+    whole.blend = vec![Blend::REPLACE; 4];
+    let mut lobe =
+        Surfaces::shaded(frame, "light_prepass/lobe.frag#gbuffer", "light_prepass/lobe.frag#gbuffer-mask")?
+            .stencil(OWNER, COLORLESS);
+    // Accumulation and base colour stay.
+    lobe.blend = vec![Blend::NONE, Blend::NONE, Blend::REPLACE, Blend::REPLACE];
+    Ok(gbuffer::fill_by(graph, frame, INFO.id, vk::Format::D32_SFLOAT_S8_UINT, |pass| {
+        pass.stencil_clear(COLORLESS);
+        draws.draw(frame, pass, |path| Some(if path == Path::Deferred { &whole } else { &lobe }));
+    }))
+}
+
+/// Third pass: the sums under the colours of the G-buffer; then draws without colours again, where their depth is equal. The stencil
+/// lets the first of equal depths pass and keeps them off the pixels of the others.
+fn apply_materials(
+    graph: &mut Graph,
+    frame: &Frame<'_>,
+    filled: GBuffer,
+    sums: &[ImageHandle; 3],
+    draws: &Draws,
+) -> Result<ImageHandle, TechniqueError> {
+    let again = Surfaces::shaded(frame, "light_prepass/material.frag", "light_prepass/material.frag#mask")?
+        .depth(DepthTest::EQUAL)
+        .stencil(FIRST_FRAGMENT, COLORED);
+    let mut pass = graph.raster("hybrid/materials");
+    frame.bind_scene(&mut pass);
+    for (slot, sum) in SUMS.iter().zip(sums) {
+        pass.read(slot, sum);
+    }
+    pass.read("gbuffer_base_color", &filled.base_color);
+    let radiance = pass.color(filled.accumulation, Load::Keep);
+    let _depth = pass.stencil(filled.depth, Load::Keep);
+    if draws.take(Path::Deferred) {
+        compose(frame, &mut pass)?;
+    }
+    draws.draw(frame, &mut pass, |path| (path == Path::Prepass).then_some(&again));
+    pass.finish();
+    Ok(radiance)
+}
+
+/// Adds what pixels with colours reflect of the light that they gathered.
+fn compose(frame: &Frame<'_>, pass: &mut RasterPass<'_>) -> Result<(), TechniqueError> {
+    let state =
+        multisample::full_screen(frame, "hybrid/compose.frag", &[])?.stencil(OWNED).blend(vec![Blend::ADD]);
+    multisample::draw_full_screen(pass, state, COLORED);
+    Ok(())
+}
