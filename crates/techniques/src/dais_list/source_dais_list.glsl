@@ -70,19 +70,4 @@ uint source_place(uint name) {
 #endif
 }
 
-// View distances of what is shaded in a pixel, at its centre; false where it shows no surface.
-bool distance_range(ivec2 pixel, out float nearest_m, out float farthest_m) {
-    nearest_m = 3.402823e38;
-    farthest_m = -1.0;
-    uint name, weight;
-    source_begin(pixel);
-    while (source_next_triangle(name, weight)) {
-        float distance_m = record_distance(source_place(name), vec2(pixel));
-        // Beside a triangle that is seen edge-on its plane may lie behind the eye: the tile has no far end then.
-        nearest_m = min(nearest_m, max(distance_m, 0.0));
-        farthest_m = max(farthest_m, distance_m > 0.0 ? distance_m : 3.402823e38);
-    }
-    return farthest_m >= 0.0;
-}
-
 #include "triangle_buffer/surface.glsl"

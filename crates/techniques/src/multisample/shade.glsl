@@ -6,14 +6,6 @@
 #include "heat.glsl"
 #include "multisample/sample_depth.glsl"
 
-#if !defined(SOURCE_DEDUP) && !defined(SOURCE_DAIS_LIST)
-// View distance of a sample's surface, negative without one: bounds of what a tile's lights must reach.
-float source_distance(ivec2 pixel, uint i) {
-    float depth = SAMPLE_DEPTH(pixel, i);
-    return depth == 0.0 ? -1.0 : distance_from_depth(depth);
-}
-#endif
-
 #if defined(SOURCE_DEDUP)
 #include "multisample/source_dedup.glsl"
 #elif defined(SOURCE_DAIS)

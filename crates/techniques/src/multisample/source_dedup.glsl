@@ -17,13 +17,6 @@ float distance_from_word(uint distance_occlusion) {
     return uintBitsToFloat((distance_occlusion & 0xffffffu) << 7);
 }
 
-// View distance of a sample's surface, negative without one: what is shaded stands at the pixel's centre, perhaps outside
-// of the triangle and of the range of the depth buffer.
-float source_distance(ivec2 pixel, uint i) {
-    float depth = texelFetch(gbuffer_depth, pixel, int(i)).r;
-    return depth == 0.0 ? -1.0 : distance_from_word(packUnorm4x8(texelFetch(gbuffer_distance, pixel, int(i))));
-}
-
 void source_begin(ivec2 pixel) {
     source_pixel = pixel;
     source_mask = all_samples();
