@@ -279,6 +279,9 @@ pub struct CommonArgs {
     /// Indirect light
     #[arg(long, value_enum, default_value_t = Indirect::None)]
     pub indirect: Indirect,
+    /// Surfaces with alpha blending: sorted back to front, or left out
+    #[arg(long, value_enum, default_value_t = Transparency::Sorted)]
+    pub transparency: Transparency,
     /// What to show: the final image, or a debug view
     #[arg(long, value_name = "final|NAME", default_value = "final")]
     pub view: String,
@@ -325,6 +328,22 @@ impl Shadows {
             Shadows::None => Some(afterlight_techniques::Shadows::None),
             Shadows::Map => Some(afterlight_techniques::Shadows::Map),
             Shadows::Pcss => None,
+        }
+    }
+}
+
+/// `--transparency`
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Transparency {
+    Sorted,
+    None,
+}
+
+impl From<Transparency> for afterlight_techniques::Transparency {
+    fn from(transparency: Transparency) -> Self {
+        match transparency {
+            Transparency::Sorted => Self::Sorted,
+            Transparency::None => Self::None,
         }
     }
 }

@@ -242,6 +242,7 @@ impl Session {
             view: common.view.clone(),
             indirect: common.indirect.into(),
             shadows: common.shadows.setting().unwrap_or_default(),
+            transparency: common.transparency.into(),
             ..Settings::for_scene(&scene, common.width, common.height)
         };
         let settings = Settings {
@@ -303,6 +304,7 @@ impl Session {
             rsm_size: (settings.indirect == Indirect::Rsm).then_some(settings.rsm_size_px),
             shadows: settings.shadows.name().to_owned(),
             shadow_map_size: (settings.shadows == Shadows::Map).then_some(settings.shadow_map_size_px),
+            transparency: settings.transparency.name().to_owned(),
             light_seed: (common.lights > 0).then_some(common.light_seed),
             version: env!("CARGO_PKG_VERSION").to_owned(),
         }

@@ -223,6 +223,40 @@ fn render_writes_png_exr_and_figures() {
     assert_eq!(stats["results"][0]["technique"], "forward");
 }
 
+/// Panes are shown unless they are refused, by a pass that is no technique's.
+#[test]
+fn panes_are_drawn_and_recorded() {
+    if !has_device() {
+        return;
+    }
+    let folder = folder();
+    let rendered = |transparency: &[&str]| -> (Value, Vec<u8>) {
+        let scene = "builtin:colonnade?triangles=17000&texture=16";
+        let files = ["-o", "a.png", "--stats", "s.json"];
+        let plain = ["render", scene, "--technique", "deferred", "--camera", "fountain"];
+        let output = run_in(folder.path(), &[&plain[..], &files, &SMALL, transparency].concat());
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        assert!(text(&output.stderr).is_empty(), "{}", text(&output.stderr));
+        let read = |file: &str| fs::read(folder.path().join(file)).expect("written");
+        (serde_json::from_slice(&read("s.json")).expect("is JSON"), read("a.png"))
+    };
+    let (shown, shown_png) = rendered(&["--quiet"]);
+    let (sorted, sorted_png) = rendered(&["--quiet", "--transparency", "sorted"]);
+    let (none, none_png) = rendered(&["--quiet", "--transparency", "none"]);
+    let setting = |run: &Value| run["settings"]["transparency"].clone();
+    assert_eq!([setting(&shown), setting(&sorted), setting(&none)], ["sorted", "sorted", "none"]);
+    assert_eq!(shown_png, sorted_png);
+    assert_ne!(sorted_png, none_png);
+    let drawn = |run: &Value| {
+        let passes = run["results"][0]["passes"].as_array().cloned().unwrap_or_default();
+        passes.iter().any(|pass| pass["name"] == "shared/transparent")
+    };
+    assert_eq!([drawn(&shown), drawn(&none)], [true, false]);
+    let bytes = |run: &Value| run["results"][0]["memory"]["technique_bytes"].clone();
+    assert_eq!(bytes(&shown), bytes(&none));
+    refused(&["render", "--transparency", "weighted"], 2, &["--transparency", "weighted", "sorted", "none"]);
+}
+
 /// Lights' views are passes of their own that no technique's memory counts, and the figures say that they were there.
 #[test]
 fn views_of_lights_are_recorded() {

@@ -111,6 +111,9 @@ pub struct SettingsRecord {
     /// Width and height of the shadow map, texels; none where there is none.
     #[serde(default)]
     pub shadow_map_size: Option<u32>,
+    /// Surfaces with alpha blending: `none` or `sorted`.
+    #[serde(default = "none")]
+    pub transparency: String,
     /// Seed of the lights; none where the scene's own lights shade.
     pub light_seed: Option<u64>,
     /// Version of the program.
@@ -294,6 +297,7 @@ mod tests {
                 rsm_size: None,
                 shadows: "none".into(),
                 shadow_map_size: None,
+                transparency: "none".into(),
                 light_seed: Some(1),
                 version: "0".into(),
             },

@@ -73,29 +73,33 @@ struct Node {
     count: u32,
 }
 
-/// A scene ready for rays. Surfaces with alpha blending are left out: they are drawn by passes of their own.
+/// A scene ready for rays.
 pub struct RayScene<'a> {
     scene: &'a Scene,
+    /// Without those with alpha blending.
     triangles: Vec<Triangle>,
     nodes: Vec<Node>,
+    /// Those with alpha blending.
+    blended: Vec<Triangle>,
 }
 
 impl<'a> RayScene<'a> {
     /// Builds the hierarchy of boxes.
     pub fn new(scene: &'a Scene) -> Self {
-        let mut triangles = Vec::new();
+        let (mut triangles, mut blended) = (Vec::new(), Vec::new());
         for (i, instance) in scene.instances.iter().enumerate() {
             let mesh = &scene.meshes[instance.mesh as usize];
-            if scene.materials[mesh.material as usize].alpha_mode == AlphaMode::Blend {
-                continue;
-            }
+            let of_kind = match scene.materials[mesh.material as usize].alpha_mode {
+                AlphaMode::Blend => &mut blended,
+                _ => &mut triangles,
+            };
             let world_from_object = widened(instance);
             for triangle in 0..mesh.index_count / 3 {
                 let corners_ws = corner_vertices(scene, instance, triangle).map(|vertex| {
                     let p = scene.positions_os[vertex].map(f64::from);
                     world_from_object.transform_point3(DVec3::from_array(p))
                 });
-                triangles.push(Triangle { corners_ws, instance: i as u32, triangle });
+                of_kind.push(Triangle { corners_ws, instance: i as u32, triangle });
             }
         }
         let mut nodes = Vec::new();
@@ -103,7 +107,7 @@ impl<'a> RayScene<'a> {
         if count > 0 {
             build(&mut nodes, &mut triangles, 0, count);
         }
-        Self { scene, triangles, nodes }
+        Self { scene, triangles, nodes, blended }
     }
 
     /// The scene.
@@ -111,7 +115,7 @@ impl<'a> RayScene<'a> {
         self.scene
     }
 
-    /// The first surface along a ray: back faces count where the material is double-sided, masked surfaces where alpha
+    /// The first surface without alpha blending along a ray: back faces count where the material is double-sided, masked surfaces where alpha
     /// reaches the cutoff.
     pub fn first_hit(&self, ray: &Ray) -> Option<Hit> {
         let mut best: Option<Hit> = None;
@@ -136,6 +140,19 @@ impl<'a> RayScene<'a> {
             }
         }
         best
+    }
+
+    /// Surfaces with alpha blending along a ray before a view distance, from far to near.
+    pub fn layers(&self, ray: &Ray, before_m: f64) -> Vec<Hit> {
+        let hits = self.blended.iter().filter_map(|triangle| self.meets(triangle, ray));
+        let mut layers: Vec<Hit> = hits.filter(|hit| hit.distance_m < before_m).collect();
+        layers.sort_by(|a, b| b.distance_m.total_cmp(&a.distance_m));
+        layers
+    }
+
+    /// Opacity of a surface with alpha blending.
+    pub fn alpha(&self, hit: &Hit) -> f64 {
+        self.base_color(self.material(hit.instance), &self.attributes(hit)).w
     }
 
     fn material(&self, instance: u32) -> &'a Material {
@@ -298,7 +315,8 @@ impl<'a> RayScene<'a> {
         }
     }
 
-    /// Linear radiance of a pixel, row 0 on top; the background's where it shows no surface.
+    /// Linear radiance of a pixel, row 0 on top; the background's where it shows no surface. Layers with alpha blending are over it,
+    /// each at its own place along the ray.
     pub fn shade_pixel(
         &self,
         lights: &[Light],
@@ -308,9 +326,15 @@ impl<'a> RayScene<'a> {
     ) -> DVec3 {
         let ray = pixel_ray(camera, pixel, size_px);
         let environment = &self.scene.environment;
-        self.first_hit(&ray).map_or(environment.background_radiance.as_dvec3(), |hit| {
-            let to_eye = -ray.direction_ws.normalize();
-            shade(&self.surface(&hit), to_eye, lights, environment.ambient_radiance.as_dvec3())
+        let to_eye = -ray.direction_ws.normalize();
+        let radiance =
+            |hit: &Hit| shade(&self.surface(hit), to_eye, lights, environment.ambient_radiance.as_dvec3());
+        let first = self.first_hit(&ray);
+        let behind = first.as_ref().map_or(environment.background_radiance.as_dvec3(), radiance);
+        let layers = self.layers(&ray, first.map_or(f64::INFINITY, |hit| hit.distance_m));
+        layers.iter().fold(behind, |below, layer| {
+            let alpha = self.alpha(layer);
+            alpha * radiance(layer) + (1.0 - alpha) * below
         })
     }
 }

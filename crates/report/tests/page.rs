@@ -42,6 +42,7 @@ fn run() -> Run {
             rsm_size: None,
             shadows: "none".to_owned(),
             shadow_map_size: None,
+            transparency: "none".to_owned(),
             light_seed: Some(1),
             version: "0.1.0".into(),
         },

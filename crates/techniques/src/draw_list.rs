@@ -90,9 +90,7 @@ impl DrawList {
             let (first, end) = (scene.bucket_first[bucket], scene.bucket_first[bucket + 1]);
             let in_view = |draw: &u32| {
                 let bounds = &scene.draw_infos[*draw as usize].bounds_ws;
-                let margin = Vec3::splat(displacement_m);
-                let reached = Aabb { min: bounds.min - margin, max: bounds.max + margin };
-                !self.options.cull || frustum.touches(&reached)
+                !self.options.cull || frustum.touches(&displaced(bounds, displacement_m))
             };
             let mut keyed: Vec<(f32, u32)> = (first..end)
                 .filter(in_view)
@@ -127,6 +125,12 @@ pub(crate) fn command(info: &DrawInfo, draw: u32) -> DrawCommand {
     }
 }
 
+/// What surfaces of those bounds reach where they are displaced by up to `displacement_m` along each axis.
+pub(crate) fn displaced(bounds: &Aabb, displacement_m: f32) -> Aabb {
+    let margin = Vec3::splat(displacement_m);
+    Aabb { min: bounds.min - margin, max: bounds.max + margin }
+}
+
 impl DrawOrder {
     /// What draws are sorted by.
     fn key(self, bounds: &Aabb, eye_ws: Vec3) -> f32 {
@@ -144,18 +148,18 @@ fn distance_sq(bounds: &Aabb, point: Vec3) -> f32 {
 }
 
 /// Half-spaces of a view: inside where dot(xyz, p) + w ≥ 0.
-struct Frustum([Vec4; 6]);
+pub(crate) struct Frustum([Vec4; 6]);
 
 impl Frustum {
     /// Rows of clip_from_world combined (Gribb and Hartmann 2001); depth is reversed, so near is w − z and far z.
-    fn new(m: Mat4) -> Self {
+    pub fn new(m: Mat4) -> Self {
         let (x, y, z, w) = (m.row(0), m.row(1), m.row(2), m.row(3));
         Self([w + x, w - x, w + y, w - y, w - z, z])
     }
 
     /// Whether a box may be in view: false only where it lies outside one half-space as a whole. Boxes with a bound
     /// that is no number are kept.
-    fn touches(&self, bounds: &Aabb) -> bool {
+    pub fn touches(&self, bounds: &Aabb) -> bool {
         !self.0.iter().any(|plane| {
             let n = plane.truncate();
             let farthest = Vec3::select(n.cmpge(Vec3::ZERO), bounds.max, bounds.min);

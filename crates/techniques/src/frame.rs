@@ -1,5 +1,7 @@
 //! What a technique is given to record a frame.
 
+use std::cell::RefCell;
+
 use afterlight_graph::{
     BufferHandle, Graph, ImageHandle, ImageInfo,
     gpu::{self, vk},
@@ -48,6 +50,8 @@ pub struct Frame<'a> {
     pub(crate) capacities: &'a Capacities,
     /// Draws that the eye has in view, by bucket, in drawing order.
     pub(crate) visible: &'a [Vec<u32>; BUCKETS],
+    /// What [`Frame::hand_over_depth`] was given.
+    pub(crate) opaque_depth: RefCell<Option<ImageHandle>>,
 }
 
 /// Buffers of the scene and the frame as the graph knows them.
@@ -127,6 +131,12 @@ impl Frame<'_> {
     /// Whether a debug view is to be shown.
     pub fn shows(&self, view: &str) -> bool {
         self.view == view
+    }
+
+    /// Leaves the depth of the frame's opaque surfaces to the passes after the technique: of the same draws by the same vertex path, at
+    /// the frame's size and samples. Without it, or where it is of another size, passes that need it draw it again.
+    pub fn hand_over_depth(&self, depth: ImageHandle) {
+        *self.opaque_depth.borrow_mut() = Some(depth);
     }
 
     /// Brings a small table that a technique made on the CPU into the graph, as a storage buffer that indirect calls

@@ -3,7 +3,7 @@
 //! A technique answers four questions (what a surface leaves behind, how lights find it, where shading runs, how samples
 //! become pixels) and is one folder: `mod.rs` with its `TECHNIQUE`, its shaders, `variants.txt` that lists their variants,
 //! a README. The build collects the folders into [`registry`]. Stages that several techniques share stand beside them:
-//! [`geometry`], [`gbuffer`], [`clusters`], [`light_view`], [`indirect`], [`shadow`], [`volumes`], [`present`], [`post`].
+//! [`geometry`], [`gbuffer`], [`clusters`], [`light_view`], [`indirect`], [`shadow`], [`volumes`], [`transparent`], [`present`], [`post`].
 //!
 //! ```no_run
 //! use afterlight_techniques::{Params, Renderer, Settings, find, graph::gpu};
@@ -48,6 +48,7 @@ pub mod shadow;
 pub mod supersample;
 mod technique;
 mod textures;
+pub mod transparent;
 pub mod triangle_buffer;
 pub mod view;
 pub mod volumes;
@@ -66,6 +67,7 @@ pub use shadow::Shadows;
 pub use technique::{
     ANY_SAMPLES, Answers, AppendixA, Exactness, Info, MULTIPLE_SAMPLES, Need, Source, Technique,
 };
+pub use transparent::Transparency;
 pub use view::LightPairs;
 
 include!(concat!(env!("OUT_DIR"), "/registry.rs"));

@@ -1,6 +1,6 @@
 //! From a scene and a technique to an image.
 
-use std::sync::Arc;
+use std::{cell::RefCell, sync::Arc};
 
 use afterlight_graph::{
     Executor, FrameReport, Graph, ImageHandle, ResourceId,
@@ -23,6 +23,7 @@ use crate::{
     scene_gpu::{SceneGpu, upload_slice},
     shadow::{self, Shadows},
     technique::Technique,
+    transparent::{self, BlendedList, Transparency},
     view::{self, LightPairs},
     volumes,
 };
@@ -69,6 +70,8 @@ pub struct Settings {
     /// Scale of the shadow map's bias: 1 is what its filter needs, less makes surfaces shadow themselves, more takes shadows
     /// off what casts them.
     pub shadow_bias: f32,
+    /// How surfaces with alpha blending are drawn.
+    pub transparency: Transparency,
 }
 
 impl Settings {
@@ -92,6 +95,7 @@ impl Settings {
             shadows: Shadows::None,
             shadow_map_size_px: shadow::DEFAULT_MAP_SIZE_PX,
             shadow_bias: 1.0,
+            transparency: Transparency::default(),
         }
     }
 }
@@ -175,7 +179,7 @@ impl Renderer {
 
     /// What of the settings this scene cannot give, a line each.
     pub fn warnings(&self) -> Vec<String> {
-        [indirect::warning, shadow::warning]
+        [indirect::warning, shadow::warning, transparent::warning]
             .into_iter()
             .filter_map(|warning| warning(&self.settings, &self.scene))
             .collect()
@@ -214,6 +218,8 @@ impl Renderer {
         let view = View::new(settings);
         let mut draws = DrawList::new(&self.device, &self.scene, options)?;
         draws.update(&self.scene, view.clip_from_world, view.eye_ws, settings.displacement_m)?;
+        let blended = BlendedList::of_view(&self.device, &self.scene, settings, &view, options.cull)?;
+        let draws = (&draws, blended.as_ref());
         let constants = self.device.create_buffer(&gpu::BufferDesc {
             name: "frame constants",
             bytes: size_of::<FrameConstants>() as u64,
@@ -225,7 +231,7 @@ impl Renderer {
         let mut capacities = Capacities::default();
         for _ in 1..RECORDINGS_MAX {
             let mut prepared =
-                self.record(technique, params, &view, &draws, &constants, &capacities, &also)?;
+                self.record(technique, params, &view, draws, &constants, &capacities, &also)?;
             if !capacities.is_watched() {
                 return Ok(prepared);
             }
@@ -241,7 +247,7 @@ impl Renderer {
             }
         }
         // What it needs still grows: its counters tell what it drops.
-        self.record(technique, params, &view, &draws, &constants, &capacities, &also)
+        self.record(technique, params, &view, draws, &constants, &capacities, &also)
     }
 
     fn check(&self, technique: &dyn Technique) -> Result<(), TechniqueError> {
@@ -312,7 +318,7 @@ impl Renderer {
         technique: &dyn Technique,
         params: &Params,
         view: &View,
-        draws: &DrawList,
+        (draws, blended): (&DrawList, Option<&BlendedList>),
         constants: &gpu::Buffer,
         capacities: &Capacities,
         also: &impl Fn(&mut Graph, &ImageHandle),
@@ -336,10 +342,14 @@ impl Renderer {
             device: &self.device,
             capacities,
             visible: &draws.visible,
+            opaque_depth: RefCell::default(),
         };
         indirect::record(&mut graph, &mut frame, settings)?;
         shadow::record(&mut graph, &mut frame, settings)?;
-        let hdr = technique.record(&mut graph, &frame)?;
+        let mut hdr = technique.record(&mut graph, &frame)?;
+        if let Some(blended) = blended {
+            hdr = transparent::draw(&mut graph, &frame, blended, technique.info().id, hdr)?;
+        }
         also(&mut graph, &hdr);
         let counts_pairs = view::counts_light_pairs(&settings.view);
         let hdr_id = (settings.keep_hdr || counts_pairs).then(|| graph.keep(&hdr));
@@ -358,7 +368,8 @@ impl Renderer {
             light_pairs: hdr_id.filter(|_| counts_pairs),
             samples: settings.samples,
             final_color: final_id,
-            draw_calls: draws.visible.iter().map(|b| b.len() as u32).sum(),
+            draw_calls: draws.visible.iter().map(|b| b.len() as u32).sum::<u32>()
+                + blended.map_or(0, |list| list.draw_count),
             width_px: settings.width_px,
             height_px: settings.height_px,
         })
@@ -501,9 +512,13 @@ impl View {
         }
     }
 
+    /// What the view distance of a point p, m, is: dot(xyz, p) + w. The view looks along -z.
+    pub fn distance_from_world(&self) -> Vec4 {
+        -self.view_from_world.row(2)
+    }
+
     pub fn constants(&self, settings: &Settings, lights: &LightList, scene: &SceneGpu) -> FrameConstants {
-        // The view looks along -z, so a point's distance is minus the third row of view_from_world.
-        let distance_from_world = -self.view_from_world.row(2);
+        let distance_from_world = self.distance_from_world();
         let near_m = match settings.camera.projection {
             Projection::Perspective { near_m, .. } | Projection::Orthographic { near_m, .. } => near_m,
         };

@@ -12,8 +12,10 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use crate::{
+    draw_list::displaced,
     error::TechniqueError,
     textures::{Role, TextureTable},
+    transparent::Blended,
 };
 
 /// Most triangles of one draw. A triangle ID keeps the triangle's number within its draw in `TRIANGLE_BITS` bits, and
@@ -62,6 +64,9 @@ impl TextureFetches {
 pub(crate) struct Bucket(pub usize);
 
 impl Bucket {
+    /// Opaque and double-sided: a state that drops no face.
+    pub const DOUBLE_SIDED: Self = Self(2);
+
     pub fn masked(self) -> bool {
         self.0 & 4 != 0
     }
@@ -73,13 +78,13 @@ impl Bucket {
     }
 }
 
-/// A scene uploaded once and shared by all techniques. Surfaces with alpha blending are left out (with a warning) until
-/// a technique draws them.
+/// A scene uploaded once and shared by all techniques. Draws with alpha blending stand apart, after the others: techniques do not
+/// see them, [`crate::transparent`] draws them.
 pub struct SceneGpu {
     pub(crate) positions: gpu::Buffer,
     pub(crate) attributes: gpu::Buffer,
     pub(crate) indices: gpu::Buffer,
-    /// One `DrawData` a draw: the vertex stream of instances.
+    /// One `DrawData` a draw, those with alpha blending last: the vertex stream of instances.
     pub(crate) draws: gpu::Buffer,
     /// The same, four texels a draw, for compute.
     pub(crate) draw_data: gpu::Image,
@@ -96,7 +101,9 @@ pub struct SceneGpu {
     pub(crate) draw_infos: Vec<DrawInfo>,
     /// First draw of each bucket; one more entry for the end.
     pub(crate) bucket_first: [u32; BUCKETS + 1],
-    /// Triangles that are drawn.
+    /// Draws with alpha blending.
+    pub(crate) blended: Blended,
+    /// Triangles that techniques draw: those without alpha blending.
     pub triangle_count: u64,
     /// Vertices in memory.
     pub vertex_count: u64,
@@ -122,7 +129,9 @@ impl SceneGpu {
         let mut uploader = device.uploader()?;
         let mut warnings = Vec::new();
         let (indices, pieces) = compact_pieces(scene);
-        let draws = DrawTable::new(scene, &pieces, &mut warnings)?;
+        let draws = DrawTable::new(scene, &pieces)?;
+        let blended =
+            Blended::new(scene, &indices, &draws.data[draws.infos.len()..], draws.blended, draws.infos.len());
         let table = TextureTable::plan(scene, device.features(), &mut warnings)?;
         let (materials, transforms) = material_records(&scene.materials, &table);
 
@@ -157,6 +166,7 @@ impl SceneGpu {
             triangle_count: draws.infos.iter().map(|d| u64::from(d.index_count / 3)).sum(),
             vertex_count: scene.positions_os.len() as u64,
             draw_infos: draws.infos,
+            blended,
             bucket_first: draws.bucket_first,
             draws: draw_buffer,
             draw_data,
@@ -174,15 +184,20 @@ impl SceneGpu {
         self.bucket_first[BUCKETS] > self.bucket_first[BUCKETS / 2]
     }
 
-    /// Box of all surfaces in world space, which displacement moves along each axis at most as far as said, m.
+    /// Box of all surfaces without alpha blending in world space, which displacement moves along each axis at most as far as said, m.
     pub(crate) fn bounds_ws(&self, displacement_m: f32) -> Aabb {
         let bounds = self.draw_infos.iter().fold(Aabb::EMPTY, |bounds, draw| bounds.union(&draw.bounds_ws));
-        Aabb { min: bounds.min - displacement_m, max: bounds.max + displacement_m }
+        displaced(&bounds, displacement_m)
     }
 
-    /// Number of draws: pieces of at most 1,024 triangles.
+    /// Number of draws without alpha blending: pieces of at most 1,024 triangles.
     pub fn draw_count(&self) -> usize {
         self.draw_infos.len()
+    }
+
+    /// Triangles with alpha blending.
+    pub fn blended_triangle_count(&self) -> u64 {
+        self.blended.triangle_count() as u64
     }
 }
 
@@ -246,25 +261,25 @@ pub(crate) fn record_image<T: bytemuck::NoUninit>(
 /// A draw: its record, what the CPU needs of it, the names of its node and its material.
 type Draw = (DrawData, DrawInfo, [Arc<str>; 2]);
 
-/// All draws of a scene by bucket.
+/// All draws of a scene by bucket, then those with alpha blending.
 struct DrawTable {
+    /// Of all draws.
     data: Vec<DrawData>,
+    /// Of those in buckets.
     infos: Vec<DrawInfo>,
     names: Vec<[Arc<str>; 2]>,
     bucket_first: [u32; BUCKETS + 1],
+    /// Of those with alpha blending.
+    blended: Vec<DrawInfo>,
 }
 
 impl DrawTable {
-    fn new(scene: &Scene, pieces: &[Vec<Aabb>], warnings: &mut Vec<String>) -> Result<Self, TechniqueError> {
+    fn new(scene: &Scene, pieces: &[Vec<Aabb>]) -> Result<Self, TechniqueError> {
         let mut by_bucket: [Vec<Draw>; BUCKETS] = Default::default();
-        let mut blended = 0u64;
+        let mut blended: Vec<Draw> = Vec::new();
         for instance in &scene.instances {
             let mesh = &scene.meshes[instance.mesh as usize];
             let material = &scene.materials[mesh.material as usize];
-            if material.alpha_mode == AlphaMode::Blend {
-                blended += 1;
-                continue;
-            }
             let m = &instance.world_from_object;
             let mirrored = m.matrix3.determinant() < 0.0;
             let masked = matches!(material.alpha_mode, AlphaMode::Mask { .. });
@@ -276,10 +291,14 @@ impl DrawTable {
                 let row = m.matrix3.row(i);
                 [row.x, row.y, row.z, m.translation[i]]
             });
+            let draws = match material.alpha_mode {
+                AlphaMode::Blend => &mut blended,
+                _ => &mut by_bucket[bucket],
+            };
             for (piece, bounds_os) in pieces[instance.mesh as usize].iter().enumerate() {
                 let first = piece as u32 * DRAW_TRIANGLES * 3;
                 let first_index = mesh.first_index + first;
-                by_bucket[bucket].push((
+                draws.push((
                     DrawData {
                         object_row0: rows[0],
                         object_row1: rows[1],
@@ -300,13 +319,13 @@ impl DrawTable {
                 ));
             }
         }
-        if blended > 0 {
-            warnings.push(format!(
-                "{blended} draws with alpha blending are left out: no opaque technique shows them"
-            ));
-        }
-        let mut table =
-            Self { data: Vec::new(), infos: Vec::new(), names: Vec::new(), bucket_first: [0; BUCKETS + 1] };
+        let mut table = Self {
+            data: Vec::new(),
+            infos: Vec::new(),
+            names: Vec::new(),
+            bucket_first: [0; BUCKETS + 1],
+            blended: Vec::new(),
+        };
         for (bucket, draws) in by_bucket.into_iter().enumerate() {
             for (data, info, names) in draws {
                 table.data.push(data);
@@ -314,6 +333,10 @@ impl DrawTable {
                 table.names.push(names);
             }
             table.bucket_first[bucket + 1] = table.data.len() as u32;
+        }
+        for (data, info, _) in blended {
+            table.data.push(data);
+            table.blended.push(info);
         }
         let limit = u64::from(u32::MAX >> TRIANGLE_BITS);
         if table.data.len() as u64 >= limit {

@@ -8,7 +8,7 @@ use afterlight_oracle::{
     shadow,
 };
 use afterlight_techniques::{
-    Exactness, Indirect, Params, Prepared, Renderer, Settings, Shadows, Technique, find,
+    Exactness, Indirect, Params, Prepared, Renderer, Settings, Shadows, Technique, Transparency, find,
     light_view::SourceView,
     registry,
     scene::{Light, LightKind},
@@ -164,6 +164,8 @@ fn has_the_shadows_that_rays_have(stage: &Stage, case: &Case, light: Light) {
     let plain = Settings {
         lights: vec![light],
         shadow_map_size_px: case.map_size_px,
+        // Rays end at opaque surfaces.
+        transparency: Transparency::None,
         ..stage.settings((SIZE[0], SIZE[1]), 0)
     };
     let probes = probes(stage, &plain);
@@ -199,10 +201,11 @@ fn has_the_shadows_that_rays_have(stage: &Stage, case: &Case, light: Light) {
 /// `forward` shades once a pixel and surface; what shades samples differs from it where pixels are cut.
 const MULTISAMPLED_MIN_DB: f64 = 40.0;
 
-/// Passes that are no technique's own.
+/// Passes that are no technique's own, without those of blended surfaces.
 fn shared_passes(prepared: &mut Prepared) -> Vec<String> {
     let report = prepared.run().unwrap_or_else(|e| panic!("{e}"));
-    report.passes.iter().filter(|pass| pass.shared).map(|pass| pass.name.clone()).collect()
+    let shared = report.passes.iter().filter(|pass| pass.shared).map(|pass| pass.name.clone());
+    shared.filter(|name| !name.starts_with("shared/transparent")).collect()
 }
 
 /// All techniques of a kind against `forward`, shadows on.

@@ -164,11 +164,17 @@ pub(crate) fn record(
     }
     let visible = Visible::find(graph, frame, info, frame.samples)?;
     let triangles = triangle_buffer::fill(graph, frame, info.id, &visible)?;
-    let source = (&*format!("dais{}", visible.tag('-')), &visible.surfaces());
-    shade(graph, frame, info, rate, source, &triangles.records, |pass| {
+    let source = format!("dais{}", visible.tag('-'));
+    let surfaces = visible.surfaces();
+    let radiance = shade(graph, frame, info, rate, (&source, &surfaces), &triangles.records, |pass| {
         visible.bind(frame, pass);
         triangles.bind(pass);
-    })
+    })?;
+    drop(surfaces);
+    if let Visible::Ids { depth, .. } = visible {
+        frame.hand_over_depth(depth);
+    }
+    Ok(radiance)
 }
 
 /// Declares the shading pass by the technique's parameters or, where the frame shows a view of `records`, its passes; `bind` binds
@@ -253,11 +259,7 @@ fn record_cached(
     let mut fill = FillPass::new(graph, frame, info, "dais/fill.frag", tags)?;
     fill.surfaces.constants = cache.constants(&list);
 
-    let mut pass = graph.raster(&name("depth"));
-    frame.bind_scene(&mut pass);
-    let depth = pass.depth(depth, Load::Clear(0.0));
-    depth_only.draw(frame, &mut pass);
-    pass.finish();
+    let depth = depth_only.fill_depth(graph, frame, &name("depth"), depth);
 
     let mut pass = graph.raster(&name("fill"));
     frame.bind_scene(&mut pass);

@@ -78,6 +78,7 @@ impl Technique for Deferred {
         pass.depth_read_only(&filled.depth);
         volumes::draw_all(frame, &mut pass, "volumes/light.frag", 1)?;
         pass.finish();
+        frame.hand_over_depth(filled.depth);
         Ok(filled.accumulation)
     }
 }

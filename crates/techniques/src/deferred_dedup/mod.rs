@@ -56,6 +56,10 @@ impl Technique for DeferredDedup {
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let filled = multisample::fill_dedup(graph, frame, "deferred-dedup")?;
         let surfaces = filled.surfaces(frame);
-        multisample::shade(graph, frame, &INFO, ("dedup", frame.samples), &surfaces, |pass| filled.bind(pass))
+        let source = ("dedup", frame.samples);
+        let radiance = multisample::shade(graph, frame, &INFO, source, &surfaces, |pass| filled.bind(pass))?;
+        drop(surfaces);
+        frame.hand_over_depth(filled.depth);
+        Ok(radiance)
     }
 }

@@ -70,11 +70,16 @@ impl Technique for DeferredMsaa {
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let filled = multisample::fill_samples(graph, frame, "deferred-msaa")?;
-        if light_step::chosen(frame, &INFO) == "all" {
-            return shade_by_stencil(graph, frame, &filled);
-        }
-        let surfaces = filled.surfaces(frame);
-        multisample::shade(graph, frame, &INFO, ("msaa", frame.samples), &surfaces, |pass| filled.bind(pass))
+        let radiance = match light_step::chosen(frame, &INFO) {
+            "all" => shade_by_stencil(graph, frame, &filled)?,
+            _ => {
+                let surfaces = filled.surfaces(frame);
+                let source = ("msaa", frame.samples);
+                multisample::shade(graph, frame, &INFO, source, &surfaces, |pass| filled.bind(pass))?
+            }
+        };
+        frame.hand_over_depth(filled.depth);
+        Ok(radiance)
     }
 }
 

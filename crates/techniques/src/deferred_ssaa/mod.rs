@@ -59,6 +59,10 @@ impl Technique for DeferredSsaa {
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let filled = multisample::fill_samples(graph, frame, "deferred-ssaa")?;
         let surfaces = filled.surfaces(frame);
-        multisample::shade(graph, frame, &INFO, ("ssaa", frame.samples), &surfaces, |pass| filled.bind(pass))
+        let source = ("ssaa", frame.samples);
+        let radiance = multisample::shade(graph, frame, &INFO, source, &surfaces, |pass| filled.bind(pass))?;
+        drop(surfaces);
+        frame.hand_over_depth(filled.depth);
+        Ok(radiance)
     }
 }

@@ -105,13 +105,14 @@ impl Technique for DeferredStencil {
         frame.bind_scene(&mut pass);
         gbuffer::bind(&mut pass, &filled);
         let accumulation = pass.color(filled.accumulation, Load::Keep);
-        let _depth = pass.stencil(filled.depth, Load::Clear(0));
+        let depth = pass.stencil(filled.depth, Load::Clear(0));
         volumes::draw_unbounded(frame, &mut pass, "volumes/light.frag", 1)?;
         for index in frame.lights.unbounded_count..frame.lights.count {
             pass.draw(volumes::volume_draw(frame, mark.clone(), index, 1));
             pass.draw(volumes::volume_draw(frame, light.clone(), index, 1));
         }
         pass.finish();
+        frame.hand_over_depth(depth);
         Ok(accumulation)
     }
 }

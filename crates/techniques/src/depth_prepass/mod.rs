@@ -72,14 +72,7 @@ pub(crate) fn draw_depth(
 ) -> Result<ImageHandle, TechniqueError> {
     let name = format!("{technique}/depth");
     let depth = graph.image(&name, frame.multisampled_info(vk::Format::D32_SFLOAT_S8_UINT));
-    let surfaces = Surfaces::depth_only(frame)?;
-    let mut pass = graph.raster(&name);
-    frame.bind_scene(&mut pass);
-    let depth = pass.depth(depth, Load::Clear(0.0));
-    pass.stencil_clear(0);
-    surfaces.draw(frame, &mut pass);
-    pass.finish();
-    Ok(depth)
+    Ok(Surfaces::depth_only(frame)?.fill_depth(graph, frame, &name, depth))
 }
 
 /// Declares the pass `technique/shade`: surfaces where `depth`, of [`draw_depth`], is equal, each shaded by `shader`, which ends in
@@ -105,9 +98,10 @@ pub(crate) fn shade_visible(
     frame.bind_scene(&mut pass);
     bind_lights(&mut pass);
     let radiance = target.attach(frame, &mut pass);
-    let _depth = pass.stencil(depth, Load::Keep);
+    let depth = pass.stencil(depth, Load::Keep);
     shaded.draw(frame, &mut pass);
     pass.finish();
+    frame.hand_over_depth(depth);
     Ok(radiance)
 }
 
@@ -130,9 +124,10 @@ impl Technique for DepthPrepass {
         frame.bind_scene(&mut pass);
         count = count.map(|count| count.bind(&mut pass));
         let radiance = target.attach(frame, &mut pass);
-        let _depth = pass.stencil(depth, Load::Keep);
+        let depth = pass.stencil(depth, Load::Keep);
         shaded.draw(frame, &mut pass);
         pass.finish();
+        frame.hand_over_depth(depth);
         count.map_or(Ok(radiance), |count| count.heat(graph, frame, "depth-prepass"))
     }
 }

@@ -65,9 +65,10 @@ impl Technique for Forward {
         frame.bind_scene(&mut pass);
         count = count.map(|count| count.bind(&mut pass));
         let radiance = target.attach(frame, &mut pass);
-        let _depth = pass.depth(depth, Load::Clear(0.0));
+        let depth = pass.depth(depth, Load::Clear(0.0));
         surfaces.draw(frame, &mut pass);
         pass.finish();
+        frame.hand_over_depth(depth);
         count.map_or(Ok(radiance), |count| count.heat(graph, frame, "forward"))
     }
 }

@@ -88,9 +88,10 @@ impl Technique for ForwardMultipass {
         let mut pass = graph.raster("forward-multipass/lights");
         frame.bind_scene(&mut pass);
         let radiance = pass.color(radiance, Load::Keep);
-        let _depth = pass.stencil(depth, Load::Keep);
+        let depth = pass.stencil(depth, Load::Keep);
         draw_lights(frame, &mut pass)?;
         pass.finish();
+        frame.hand_over_depth(depth);
         Ok(radiance)
     }
 }

@@ -123,5 +123,6 @@ pub(crate) fn shade_by(
     let radiance = pass.write("hdr", filled.accumulation);
     pass.dispatch(frame.groups(8));
     pass.finish();
+    frame.hand_over_depth(filled.depth);
     Ok(radiance)
 }

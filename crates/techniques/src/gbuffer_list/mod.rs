@@ -232,17 +232,23 @@ impl Technique for GbufferList {
             Samples::Keys(keys) => clusters::Surfaces::of_keys(keys, layout.samples),
             Samples::Depth(depth) => clusters::Surfaces::of_depth(depth, layout.samples),
         };
-        multisample::shade(graph, frame, &INFO, (source, layout.samples), &surfaces, |pass| {
-            for (name, value) in layout.constants() {
-                pass.constant(name, value);
-            }
-            pass.constant("KEEPS_ALL", u32::from(layout.keeps_all));
-            pass.read("Blocks", &lists.blocks);
-            match &lists.samples {
-                Samples::Depth(depth) => pass.read("gbuffer_depth", depth),
-                Samples::Keys(keys) => pass.read("SampleKeys", keys),
-            };
-        })
+        let radiance =
+            multisample::shade(graph, frame, &INFO, (source, layout.samples), &surfaces, |pass| {
+                for (name, value) in layout.constants() {
+                    pass.constant(name, value);
+                }
+                pass.constant("KEEPS_ALL", u32::from(layout.keeps_all));
+                pass.read("Blocks", &lists.blocks);
+                match &lists.samples {
+                    Samples::Depth(depth) => pass.read("gbuffer_depth", depth),
+                    Samples::Keys(keys) => pass.read("SampleKeys", keys),
+                };
+            })?;
+        drop(surfaces);
+        if let Samples::Depth(depth) = lists.samples {
+            frame.hand_over_depth(depth);
+        }
+        Ok(radiance)
     }
 }
 
@@ -341,12 +347,7 @@ fn fill_by_raster(graph: &mut Graph, frame: &Frame<'_>, layout: &Layout) -> Resu
     let (blocks, count, flagged) = empty_lists(graph, frame, layout)?;
     let claims = claims(graph, frame, INFO.id, layout.samples);
 
-    let mut pass = graph.raster("gbuffer-list/depth");
-    frame.bind_scene(&mut pass);
-    let depth = pass.depth(depth, Load::Clear(0.0));
-    pass.stencil_clear(0);
-    depth_only.draw(frame, &mut pass);
-    pass.finish();
+    let depth = depth_only.fill_depth(graph, frame, "gbuffer-list/depth", depth);
 
     let mut pass = graph.raster("gbuffer-list/fill");
     frame.bind_scene(&mut pass);

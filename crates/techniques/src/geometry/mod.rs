@@ -7,7 +7,8 @@
 use std::ops::Range;
 
 use afterlight_graph::{
-    Blend, BufferHandle, DepthTest, Draw, DrawCall, RasterPass, RasterState, Rect, StencilTest, gpu::vk,
+    Blend, BufferHandle, DepthTest, Draw, DrawCall, Graph, ImageHandle, Load, RasterPass, RasterState, Rect,
+    StencilTest, gpu::vk,
 };
 use afterlight_graph::{VertexAttribute, VertexLayout, VertexStream};
 use afterlight_shader::Shader;
@@ -226,6 +227,25 @@ impl Surfaces {
         pass.draw(self.bucket_draw(frame, bucket, call));
     }
 
+    /// Declares the pass `name` that clears a depth image, and its stencil where it has one, and draws the surfaces into it.
+    pub(crate) fn fill_depth(
+        &self,
+        graph: &mut Graph,
+        frame: &Frame<'_>,
+        name: &str,
+        depth: ImageHandle,
+    ) -> ImageHandle {
+        let mut pass = graph.raster(name);
+        frame.bind_scene(&mut pass);
+        let depth = pass.depth(depth, Load::Clear(0.0));
+        if has_stencil(depth.info().format) {
+            pass.stencil_clear(0);
+        }
+        self.draw(frame, &mut pass);
+        pass.finish();
+        depth
+    }
+
     /// A draw of surfaces of one bucket by any call whose first instances are draw numbers.
     pub(crate) fn bucket_draw<'a>(
         &self,
@@ -261,6 +281,12 @@ impl Surfaces {
         draw.scissor = self.scissor;
         draw
     }
+}
+
+/// Whether a format holds a stencil beside depth.
+fn has_stencil(format: vk::Format) -> bool {
+    use vk::Format as F;
+    matches!(format, F::D16_UNORM_S8_UINT | F::D24_UNORM_S8_UINT | F::D32_SFLOAT_S8_UINT)
 }
 
 /// Checks that the device can number triangles.

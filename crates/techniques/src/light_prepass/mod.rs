@@ -138,8 +138,9 @@ fn apply_materials(
         pass.read(slot, sum);
     }
     let radiance = pass.color(radiance, Load::Clear(frame.background()));
-    let _depth = pass.stencil(depth, Load::Keep);
+    let depth = pass.stencil(depth, Load::Keep);
     surfaces.draw(frame, &mut pass);
     pass.finish();
+    frame.hand_over_depth(depth);
     Ok(radiance)
 }

@@ -95,6 +95,17 @@ impl LightStep {
         })
     }
 
+    /// For surfaces wherever they stand, whatever shows of them: a loop where lights are few, else the tree over them.
+    ///
+    /// # Errors
+    /// A shader that is not compiled in.
+    pub(crate) fn anywhere(graph: &mut Graph, frame: &Frame<'_>, user: &str) -> Result<Self, TechniqueError> {
+        match frame.lights.count <= FEW_LIGHTS {
+            true => Ok(Self::All),
+            false => Ok(Self::Tree(light_bvh::build(graph, frame, user)?)),
+        }
+    }
+
     /// Builds lists of lights a pixel over a depth buffer of the frame's samples.
     ///
     /// # Errors

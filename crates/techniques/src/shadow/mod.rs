@@ -3,7 +3,7 @@
 //! The light sees the scene once a frame, in `shared/shadow`; whatever shades asks its depths, in `light_radiance` of
 //! `include/shading.glsl`. See the README of this folder.
 
-use afterlight_graph::{BufferHandle, Graph, ImageHandle, ImageInfo, Load, gpu::vk};
+use afterlight_graph::{BufferHandle, Graph, ImageHandle, ImageInfo, gpu::vk};
 use afterlight_scene::Projection;
 use afterlight_shader::structs::ShadowConstants;
 use glam::{Mat4, Vec3};
@@ -127,12 +127,7 @@ fn raster(
     let mut surfaces = Surfaces::depth_only(frame)?;
     // Less is farther.
     surfaces.depth_bias_slope = -2.0 * FILTER_REACH_TEXELS * bias;
-    let mut pass = graph.raster("shared/shadow");
-    frame.bind_scene(&mut pass);
-    let map = pass.depth(map, Load::Clear(0.0));
-    surfaces.draw(frame, &mut pass);
-    pass.finish();
-    Ok(map)
+    Ok(surfaces.fill_depth(graph, frame, "shared/shadow", map))
 }
 
 #[cfg(test)]

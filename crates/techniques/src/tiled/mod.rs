@@ -61,6 +61,7 @@ impl Technique for Tiled {
         let radiance = pass.write("hdr", filled.accumulation);
         pass.dispatch(frame.groups(16));
         pass.finish();
+        frame.hand_over_depth(filled.depth);
         Ok(radiance)
     }
 }

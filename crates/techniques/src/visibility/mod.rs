@@ -77,9 +77,12 @@ impl Technique for Visibility {
         let depth = pass.depth(depth, Load::Clear(0.0));
         surfaces.draw(frame, &mut pass);
         pass.finish();
-        shade(graph, frame, "visibility/shade.comp", &Surfaces::of_depth(&depth, 1), |pass| {
-            pass.read("ids", &ids);
-        })
+        let radiance =
+            shade(graph, frame, "visibility/shade.comp", &Surfaces::of_depth(&depth, 1), |pass| {
+                pass.read("ids", &ids);
+            })?;
+        frame.hand_over_depth(depth);
+        Ok(radiance)
     }
 }
 

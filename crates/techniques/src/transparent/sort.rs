@@ -1,0 +1,227 @@
+//! The order in which triangles with alpha blending are drawn: back to front, found on the CPU.
+
+use std::ops::Range;
+
+use afterlight_scene::{Aabb, Scene};
+use afterlight_shader::structs::DrawData;
+use glam::{Mat4, Vec3, Vec4};
+
+use crate::{
+    draw_list::{DrawCommand, Frustum, displaced},
+    scene_gpu::DrawInfo,
+};
+
+/// What the CPU keeps of a scene's draws with alpha blending.
+pub(crate) struct Blended {
+    draws: Vec<BlendedDraw>,
+    /// Centroids of all triangles, draw by draw, m.
+    centroids_ws: Vec<Vec3>,
+    /// Their corners, counted from the first vertex of their draw.
+    corners: Vec<[u32; 3]>,
+}
+
+struct BlendedDraw {
+    /// Its number among all draws of the scene.
+    number: u32,
+    bounds_ws: Aabb,
+    first_vertex: u32,
+    /// Its triangles in [`Blended::corners`].
+    triangles: Range<usize>,
+}
+
+/// How a view orders triangles.
+pub(crate) struct ViewOrder {
+    /// Leaves out draws outside of this view.
+    pub cull: Option<Mat4>,
+    /// The view distance of a point p is dot(xyz, p) + w, m.
+    pub distance_from_world: Vec4,
+    /// How far surfaces may be displaced along each axis, m.
+    pub displacement_m: f32,
+    /// Orders triangles up to this many, beyond it draws.
+    pub triangles_max: usize,
+}
+
+/// Triangles in drawing order.
+#[derive(Default)]
+pub(crate) struct Ordered {
+    /// Three a triangle, counted from the first vertex of its draw.
+    pub indices: Vec<u32>,
+    /// One a run of triangles of one draw.
+    pub commands: Vec<DrawCommand>,
+    /// Draws in view.
+    pub draw_count: u32,
+}
+
+impl Blended {
+    /// Of draws given by their records and bounds; the first has the number `first_number`. `indices` are those that the
+    /// draws refer to.
+    pub fn new(
+        scene: &Scene,
+        indices: &[u32],
+        records: &[DrawData],
+        infos: Vec<DrawInfo>,
+        first_number: usize,
+    ) -> Self {
+        let mut blended = Self { draws: Vec::new(), centroids_ws: Vec::new(), corners: Vec::new() };
+        for (k, (record, info)) in records.iter().zip(&infos).enumerate() {
+            let first = blended.corners.len();
+            let positions_os = &scene.positions_os[info.first_vertex as usize..];
+            for corners in indices[info.first_index as usize..][..info.index_count as usize].chunks_exact(3) {
+                let sum_os: Vec3 = corners.iter().map(|&i| Vec3::from(positions_os[i as usize])).sum();
+                blended.centroids_ws.push(to_world(record, sum_os / 3.0));
+                blended.corners.push([corners[0], corners[1], corners[2]]);
+            }
+            blended.draws.push(BlendedDraw {
+                number: (first_number + k) as u32,
+                bounds_ws: info.bounds_ws,
+                first_vertex: info.first_vertex,
+                triangles: first..blended.corners.len(),
+            });
+        }
+        blended
+    }
+
+    /// Number of triangles.
+    pub fn triangle_count(&self) -> usize {
+        self.corners.len()
+    }
+
+    /// Number of draws.
+    pub fn draw_count(&self) -> usize {
+        self.draws.len()
+    }
+
+    /// Orders the triangles of the draws in view from far to near by the view distance of their centroids; those of one distance as
+    /// in the scene.
+    pub fn order(&self, view: &ViewOrder) -> Ordered {
+        let frustum = view.cull.map(Frustum::new);
+        let in_view = |draw: &BlendedDraw| {
+            let reached = displaced(&draw.bounds_ws, view.displacement_m);
+            frustum.as_ref().is_none_or(|frustum| frustum.touches(&reached))
+        };
+        let visible: Vec<&BlendedDraw> = self.draws.iter().filter(|draw| in_view(draw)).collect();
+        let distance = |p: Vec3| view.distance_from_world.dot(p.extend(1.0));
+        let mut ordered = Ordered { draw_count: visible.len() as u32, ..Ordered::default() };
+        if self.triangle_count() > view.triangles_max {
+            let runs = visible.iter().map(|draw| (distance(draw.bounds_ws.center()), *draw)).collect();
+            for draw in back_to_front(runs) {
+                ordered.push(draw, &self.corners[draw.triangles.clone()]);
+            }
+            return ordered;
+        }
+        let triangles = visible.iter().flat_map(|draw| {
+            draw.triangles.clone().map(|triangle| (distance(self.centroids_ws[triangle]), (*draw, triangle)))
+        });
+        for (draw, triangle) in back_to_front(triangles.collect()) {
+            ordered.push(draw, &self.corners[triangle..=triangle]);
+        }
+        ordered
+    }
+}
+
+/// Sorts from the greatest distance to the least; equal ones keep their order.
+fn back_to_front<T>(mut keyed: Vec<(f32, T)>) -> impl Iterator<Item = T> {
+    keyed.sort_by(|a, b| b.0.total_cmp(&a.0));
+    keyed.into_iter().map(|(_, one)| one)
+}
+
+fn to_world(record: &DrawData, p_os: Vec3) -> Vec3 {
+    let rows = [record.object_row0, record.object_row1, record.object_row2];
+    Vec3::from(rows.map(|row| Vec4::from(row).dot(p_os.extend(1.0))))
+}
+
+impl Ordered {
+    /// Adds triangles of a draw, to the last run where that is of the same draw.
+    fn push(&mut self, draw: &BlendedDraw, corners: &[[u32; 3]]) {
+        if self.commands.last().is_none_or(|last| last.first_instance != draw.number) {
+            self.commands.push(DrawCommand {
+                index_count: 0,
+                instance_count: 1,
+                first_index: self.indices.len() as u32,
+                vertex_offset: draw.first_vertex as i32,
+                first_instance: draw.number,
+            });
+        }
+        if let Some(last) = self.commands.last_mut() {
+            last.index_count += 3 * corners.len() as u32;
+        }
+        self.indices.extend(corners.iter().flatten());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use afterlight_scene::Camera;
+
+    /// Draws whose triangles have their centroids at those distances, m; corners are numbered through a draw.
+    fn blended(draws: &[&[f32]]) -> Blended {
+        let mut blended = Blended { draws: Vec::new(), centroids_ws: Vec::new(), corners: Vec::new() };
+        for (number, distances_m) in (10..).zip(draws) {
+            let first = blended.corners.len();
+            let mut bounds_ws = Aabb::EMPTY;
+            for (t, distance_m) in (0..).zip(*distances_m) {
+                let centroid = Vec3::new(0.0, 0.0, -distance_m);
+                bounds_ws.extend(centroid);
+                blended.centroids_ws.push(centroid);
+                blended.corners.push([3 * t, 3 * t + 1, 3 * t + 2]);
+            }
+            let triangles = first..blended.corners.len();
+            blended.draws.push(BlendedDraw { number, bounds_ws, first_vertex: 100 * number, triangles });
+        }
+        blended
+    }
+
+    fn view(triangles_max: usize) -> ViewOrder {
+        ViewOrder { cull: None, distance_from_world: Vec4::NEG_Z, displacement_m: 0.0, triangles_max }
+    }
+
+    /// Draw and triangles of each run.
+    fn runs(ordered: &Ordered) -> Vec<(u32, Vec<u32>)> {
+        let run = |c: &DrawCommand| {
+            let indices = &ordered.indices[c.first_index as usize..][..c.index_count as usize];
+            assert_eq!((c.instance_count, c.vertex_offset as u32), (1, 100 * c.first_instance));
+            (c.first_instance, indices.chunks_exact(3).map(|corners| corners[0] / 3).collect())
+        };
+        ordered.commands.iter().map(run).collect()
+    }
+
+    #[test]
+    fn triangles_run_from_far_to_near() {
+        let scene = blended(&[&[1.0, 5.0, 2.0], &[3.0, 4.0]]);
+        let expected = vec![(10, vec![1]), (11, vec![1, 0]), (10, vec![2, 0])];
+        assert_eq!(runs(&scene.order(&view(100))), expected);
+        // The other way round from the other side.
+        let behind = ViewOrder { distance_from_world: Vec4::Z, ..view(100) };
+        let expected = vec![(10, vec![0, 2]), (11, vec![0, 1]), (10, vec![1])];
+        assert_eq!(runs(&scene.order(&behind)), expected);
+    }
+
+    #[test]
+    fn equal_distances_keep_the_order_of_the_scene() {
+        let scene = blended(&[&[2.0; 5], &[2.0; 3], &[2.0, 3.0]]);
+        let expected = vec![(12, vec![1]), (10, vec![0, 1, 2, 3, 4]), (11, vec![0, 1, 2]), (12, vec![0])];
+        assert_eq!(runs(&scene.order(&view(100))), expected);
+    }
+
+    #[test]
+    fn too_many_triangles_are_sorted_by_draws() {
+        let scene = blended(&[&[1.0, 5.0, 2.0], &[3.0, 4.0]]);
+        // Bounds' centres are 3 and 3.5 m away.
+        let by_draw = vec![(11, vec![0, 1]), (10, vec![0, 1, 2])];
+        assert_eq!(runs(&scene.order(&view(4))), by_draw);
+        assert_ne!(runs(&scene.order(&view(5))), by_draw);
+    }
+
+    #[test]
+    fn what_is_out_of_view_is_left_out() {
+        let scene = blended(&[&[1.0, 2.0], &[-1.0, -2.0]]);
+        let camera = Camera::look_at("along -z", Vec3::ZERO, Vec3::NEG_Z, 1.0, 0.1);
+        let clip_from_world = camera.clip_from_view(1.0) * camera.view_from_world();
+        let culled = ViewOrder { cull: Some(clip_from_world), ..view(100) };
+        let ordered = scene.order(&culled);
+        assert_eq!((runs(&ordered), ordered.draw_count), (vec![(10, vec![1, 0])], 1));
+        let displaced = ViewOrder { displacement_m: 1.5, ..culled };
+        assert_eq!(scene.order(&displaced).draw_count, 2);
+    }
+}
