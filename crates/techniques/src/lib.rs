@@ -3,7 +3,7 @@
 //! A technique answers four questions (what a surface leaves behind, how lights find it, where shading runs, how samples
 //! become pixels) and is one folder: `mod.rs` with its `TECHNIQUE`, its shaders, `variants.txt` that lists their variants,
 //! a README. The build collects the folders into [`registry`]. Stages that several techniques share stand beside them:
-//! [`geometry`], [`gbuffer`], [`clusters`], [`light_view`], [`indirect`], [`shadow`], [`volumes`], [`transparent`], [`present`], [`post`].
+//! [`geometry`], [`gbuffer`], [`light_step`], [`clusters`], [`light_view`], [`indirect`], [`shadow`], [`volumes`], [`transparent`], [`present`], [`post`].
 //!
 //! ```no_run
 //! use afterlight_techniques::{Params, Renderer, Settings, find, graph::gpu};

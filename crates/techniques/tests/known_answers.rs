@@ -10,7 +10,7 @@ use afterlight_oracle::{
 use afterlight_techniques::{
     Frame, Info, Params, Technique, TechniqueError,
     cost::{Cost, Workload},
-    find, gbuffer,
+    device_order, find, gbuffer,
     graph::{Graph, ImageHandle, gpu::vk},
     registry,
     scene::{Camera, Light, Projection, builtin::edge_coverage},
@@ -196,7 +196,8 @@ fn tiles_hold_the_lights_of_their_cpu_twin_and_miss_none() {
     let gpu = afterlight_testkit::gpu();
     let stage = Stage::new(&gpu, "builtin:colonnade?triangles=20000");
     for (size, count) in [((160u32, 90u32), 100u32), ((113, 61), 1500)] {
-        let settings = stage.settings(size, count);
+        let mut settings = stage.settings(size, count);
+        settings.lights = device_order(&settings.lights);
         let mut prepared = stage.prepare(&TiledWithBits, &settings);
         prepared.run().unwrap();
         let depth = prepared.executor().read_image("tiled/depth").unwrap();

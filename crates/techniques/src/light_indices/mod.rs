@@ -20,7 +20,7 @@ pub const INDEX_PARTS: ParamInfo = ParamInfo {
 /// What both techniques keep of the lights.
 pub(crate) const EXACTNESS: Exactness = Exactness::Approximate {
     bound: "of the lights with an end that reach a pixel's surface the four nearest, by the view distance of their centres; exact where no more than four do",
-    min_psnr_db: 12.0,
+    min_psnr_db: 10.0,
 };
 
 /// Values of a part: `PART_VALUES` of `parts.glsl`.
