@@ -3,8 +3,9 @@
 #ifndef AFTERLIGHT_LIGHT_PAIRS
 #define AFTERLIGHT_LIGHT_PAIRS
 
-// 1 where pairs are counted.
+// 1 where pairs are counted; CELL_COLORS where the cells of clusters/ are shown instead.
 layout(constant_id = 23) const uint LIGHT_PAIRS = 0u;
+const uint CELL_COLORS = 2u;
 
 // What one pair is: RGBA16F then ends at 67 million pairs a pixel, not at 65,504. Twin: LIGHT_PAIR in techniques/src/view/light_pairs.rs.
 const float LIGHT_PAIR = 1.0 / 1024.0;

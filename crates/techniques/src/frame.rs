@@ -238,7 +238,7 @@ impl Frame<'_> {
             .chain([
                 ("ONLY_POINT_LIGHTS", u32::from(self.lights.only_points)),
                 ("SHADOWS", u32::from(self.buffers.shadow.as_ref().is_some_and(|s| s.map.is_some()))),
-                ("LIGHT_PAIRS", u32::from(view::counts_light_pairs(self.view))),
+                ("LIGHT_PAIRS", view::light_pairs_constant(self.view)),
                 ("INDIRECT_SAMPLES", self.buffers.rsm.as_ref().map_or(0, Rsm::sample_count)),
             ])
             .filter(|(name, _)| shaders.iter().any(|s| s.reflection.spec_constant(name).is_some()))

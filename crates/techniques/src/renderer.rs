@@ -565,7 +565,7 @@ fn distance_range_m(bounds_ws: &Aabb, distance_from_world: Vec4, near_m: f32) ->
 
 /// Radiance of pixels without a surface: none where it would be taken for pairs of lights.
 fn background_radiance(settings: &Settings) -> Vec3 {
-    match view::counts_light_pairs(&settings.view) {
+    match view::replaces_light(&settings.view) {
         true => Vec3::ZERO,
         false => settings.environment.background_radiance,
     }

@@ -127,3 +127,35 @@ fn forward_families_agree_at_several_samples() {
         assert!(db >= 50.0, "{id}: {db:.2} dB to forward at 4 samples");
     }
 }
+
+/// Tiles have a colour each, clusters several a tile; none is white, since no surface of one sample is without a cell.
+#[test]
+fn the_view_of_cells_shows_each_in_a_colour() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=17000&texture=64");
+    let shown = Settings { view: afterlight_techniques::view::CLUSTERS.to_owned(), ..settings(&stage, 1) };
+    let colors = |id: &str| {
+        let image = image_of(&mut stage.prepare(find(id).unwrap(), &shown));
+        let mut tiles = std::collections::BTreeMap::new();
+        for (i, pixel) in image.pixels.chunks_exact(4).enumerate() {
+            let (x, y) = (i as u32 % image.width, i as u32 / image.width);
+            let color = [pixel[0], pixel[1], pixel[2]];
+            assert_ne!(color, [255; 3], "{id}: no cell holds ({x}, {y})");
+            if color != [0; 3] {
+                tiles.entry([x / 16, y / 16]).or_insert_with(std::collections::BTreeSet::new).insert(color);
+            }
+        }
+        tiles
+    };
+    for id in ["tiled-forward", "forward-plus"] {
+        let tiles = colors(id);
+        assert!(tiles.values().all(|colors| colors.len() == 1), "{id}: a tile of several colours");
+        let all: std::collections::BTreeSet<_> = tiles.values().flatten().collect();
+        assert!(all.len() * 10 > tiles.len() * 9, "{id}: {} colours of {} tiles", all.len(), tiles.len());
+    }
+    for id in ["clustered", "visibility"] {
+        let tiles = colors(id);
+        let several = tiles.values().filter(|colors| colors.len() > 1).count();
+        assert!(several * 2 > tiles.len(), "{id}: {several} of {} tiles have several clusters", tiles.len());
+    }
+}

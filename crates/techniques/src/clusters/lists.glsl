@@ -42,6 +42,17 @@ bool cell_of(uvec2 pixel, float distance_m, out uint place) {
     return within && (word.x & bit) != 0u && place < CELL_CAPACITY;
 }
 
+// A colour of its own for the cell of a surface; white where none holds it.
+vec3 cell_color(uvec2 pixel, float distance_m) {
+    uint place;
+    if (!cell_of(pixel, distance_m, place)) {
+        return vec3(1.0);
+    }
+    uint bits = (cells[place].number + 1u) * 2654435761u;   // a multiplicative hash: 2^32 over the golden ratio
+    bits ^= bits >> 15;
+    return vec3(bits & 255u, bits >> 8 & 255u, bits >> 16 & 255u) / 320.0;
+}
+
 // Radiance of the lights with an end that reach a surface of a pixel at a view distance. A surface that no cell was made for, since
 // it is shaded off the samples that show it, asks the tree over the lights.
 vec3 cell_radiance(ShadingPoint p, uvec2 pixel, float distance_m) {

@@ -6,8 +6,8 @@ use afterlight_graph::{Graph, ImageHandle, Load, gpu::vk};
 
 use crate::{
     Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError,
-    cost::{self, Cost, Workload},
     clusters::Surfaces,
+    cost::{self, Cost, Workload},
     gbuffer,
     light_step::{self, LightStep},
     volumes,

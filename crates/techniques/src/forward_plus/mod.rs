@@ -21,7 +21,10 @@ static INFO: Info = Info {
     id: "forward-plus",
     title: "Forward+ with 2.5D culling",
     summary: "A pass for depth alone; each tile lists the lights that touch one of its 32 steps of depth that hold a surface; then forward shading by the lists.",
-    sources: &[Source { key: "petrescu-2016", section: "4.9" }, Source { key: "harada-2012", section: "all" }],
+    sources: &[
+        Source { key: "petrescu-2016", section: "4.9" },
+        Source { key: "harada-2012", section: "all" },
+    ],
     answers: Answers {
         surface: "nothing (depth)",
         lights: "tiles with a mask of depth",

@@ -11,6 +11,8 @@ use crate::{
 
 /// Children of a node: `TREE_WIDTH` in `tree.glsl`.
 const WIDTH: u32 = 32;
+/// Groups of a row of a dispatch: every device takes as many. `GROUPS_A_ROW` in `boxes.comp.glsl`.
+const GROUPS_A_ROW: u32 = 32_768;
 /// Width of the image of boxes, texels: 512 nodes.
 const ROW_TEXELS: u32 = 1024;
 
@@ -47,7 +49,7 @@ pub fn build(graph: &mut Graph, frame: &Frame<'_>, technique: &str) -> Result<Li
         let mut pass = frame.compute(graph, &format!("{technique}/light boxes {level}"), &shader);
         pass.constant("LEVEL", level);
         boxes = pass.write("boxes", boxes);
-        pass.dispatch([count.div_ceil(64), 1, 1]);
+        pass.dispatch([count.min(GROUPS_A_ROW), count.div_ceil(GROUPS_A_ROW), 1]);
         pass.finish();
     }
     Ok(LightBvh { boxes: Some(boxes) })

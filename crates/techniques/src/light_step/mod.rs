@@ -10,6 +10,7 @@ use crate::{
     frame::{Frame, Slots},
     light_bvh::{self, LightBvh},
     light_lists::{self, LightLists},
+    view,
 };
 
 /// Lights up to which a loop over all of them costs less than any structure, by `auto`.
@@ -64,8 +65,11 @@ fn division(value: &str, params: &Params) -> Option<Division> {
 }
 
 /// The value of `lights` of a frame's technique, `auto` resolved.
+///
+/// The view of cells shows clusters where the technique would have none.
 pub(crate) fn chosen<'a>(frame: &'a Frame<'_>, info: &'a Info) -> &'a str {
     match frame.params.text(info, KEY) {
+        value if frame.shows(view::CLUSTERS) && !value.starts_with("tiles") => "clusters",
         "auto" if frame.lights.count <= FEW_LIGHTS => "all",
         "auto" => "clusters",
         value => value,

@@ -14,6 +14,9 @@ layout(constant_id = 46) const uint LIGHT_STEP = STEP_ALL;
 
 // Radiance of the lights, for a surface of a pixel at a view distance.
 vec3 lights_radiance(ShadingPoint p, uvec2 pixel, float distance_m) {
+    if (LIGHT_PAIRS == CELL_COLORS) {
+        return cell_color(pixel, distance_m);
+    }
     if (LIGHT_STEP == STEP_ALL) {
         return all_lights_radiance(p);
     }

@@ -15,6 +15,9 @@ pub const LIGHT_ERROR: &str = "light-error";
 /// Views of any technique whose image is a sum of `light_radiance`.
 pub const LIGHT_PAIRS: &[&str] = &[LIGHT_COUNT, LIGHT_ERROR];
 
+/// The cells, tiles or clusters, that surfaces find their lights by: a colour each; white is a surface that none holds.
+pub const CLUSTERS: &str = "clusters";
+
 /// What one pair adds to the image; twin: `include/light_pairs.glsl`.
 pub(crate) const LIGHT_PAIR: f64 = 1.0 / 1024.0;
 
@@ -24,6 +27,19 @@ const EXACT_COUNTS: f64 = 2048.0;
 /// Whether a view counts pairs of lights and surfaces.
 pub fn counts_light_pairs(view: &str) -> bool {
     LIGHT_PAIRS.contains(&view)
+}
+
+/// Whether a view shows sums over lights that are not radiance, of surfaces alone.
+pub(crate) fn replaces_light(view: &str) -> bool {
+    light_pairs_constant(view) > 0
+}
+
+/// Specialization constant of `include/light_pairs.glsl`.
+pub(crate) fn light_pairs_constant(view: &str) -> u32 {
+    match view {
+        CLUSTERS => 2,
+        view => u32::from(counts_light_pairs(view)),
+    }
 }
 
 /// Pairs of a light and a surface over a frame. At several samples a pixel counts the mean of its samples.

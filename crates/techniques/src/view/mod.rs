@@ -5,13 +5,20 @@
 mod light_pairs;
 mod records;
 
-pub use light_pairs::{LIGHT_COUNT, LIGHT_ERROR, LIGHT_PAIRS, LightPairs, counts_light_pairs};
+pub use light_pairs::{CLUSTERS, LIGHT_COUNT, LIGHT_ERROR, LIGHT_PAIRS, LightPairs, counts_light_pairs};
 pub(crate) use light_pairs::{LIGHT_PAIR, light_pair_colors};
+pub(crate) use light_pairs::{light_pairs_constant, replaces_light};
 pub use records::{ATTRIBUTE_ERRORS, RECORD_SAMPLES, RecordSource};
 
 use afterlight_graph::{Graph, ImageHandle, RasterPass, gpu::vk};
 
-use crate::{error::TechniqueError, frame::Frame, technique::Technique};
+use crate::{
+    clusters::{CLUSTER_PX, TILE_PX},
+    error::TechniqueError,
+    frame::Frame,
+    params::Params,
+    technique::Technique,
+};
 
 /// The image itself.
 pub const FINAL: &str = "final";
@@ -38,10 +45,12 @@ pub const TEXTURE_ERROR: &str = "texture-error";
 pub const TRIANGLES: &[&str] =
     &[SAMPLE_USAGE, INVOCATIONS, EDGES, WEIGHTS, TRIANGLE_SHARING, ATTRIBUTE_ERROR, TEXTURE_ERROR];
 
-/// Debug views that a technique has besides [`FINAL`]: its own and those of light pairs.
+/// Debug views that a technique has besides [`FINAL`]: its own, those of light pairs, and that of cells.
 pub fn of(technique: &dyn Technique) -> Vec<&'static str> {
     let pairs = if technique.counts_light_pairs() { LIGHT_PAIRS } else { &[] };
-    technique.info().views.iter().chain(pairs).copied().collect()
+    let has_cells = Params::known(technique.info()).any(|p| [TILE_PX.key, CLUSTER_PX.key].contains(&p.key));
+    let cells = if has_cells { &[CLUSTERS][..] } else { &[] };
+    technique.info().views.iter().chain(pairs).chain(cells).copied().collect()
 }
 
 /// Whether a view is one of [`RecordSource`].
