@@ -86,6 +86,18 @@ pub trait Slots {
     fn textures(&mut self, set: &gpu::DescriptorSet);
 }
 
+/// What a source of surfaces is bound to: the slots of a pass, and specialization constants of its shaders.
+pub trait SourceSlots: Slots {
+    /// Sets a specialization constant.
+    fn constant(&mut self, name: &str, value: u32);
+}
+
+impl SourceSlots for afterlight_graph::ComputePass<'_> {
+    fn constant(&mut self, name: &str, value: u32) {
+        afterlight_graph::ComputePass::constant(self, name, value);
+    }
+}
+
 macro_rules! slots {
     ($pass:ident) => {
         impl Slots for afterlight_graph::$pass<'_> {

@@ -6,13 +6,14 @@ mod passes;
 
 pub(crate) use passes::{FillPass, depth_surfaces};
 
-use afterlight_graph::{BufferHandle, ComputePass, Graph, ImageHandle, Load, RasterPass, gpu::vk};
+use afterlight_graph::{BufferHandle, Graph, ImageHandle, Load, RasterPass, gpu::vk};
 
 use crate::{
     ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, ParamInfo, ParamKind, Params, Source, Technique,
     TechniqueError, clusters, compute_raster,
     cost::{self, Cost, Workload},
     dais_multirate::LowRate,
+    frame::SourceSlots,
     light_step,
     multisample::{self, NO_TRIANGLE_RGBA8, Visible},
     triangle_buffer::{self, Records},
@@ -166,7 +167,7 @@ pub(crate) fn record(
     let triangles = triangle_buffer::fill(graph, frame, info.id, &visible)?;
     let source = format!("dais{}", visible.tag('-'));
     let surfaces = visible.surfaces();
-    let radiance = shade(graph, frame, info, rate, (&source, &surfaces), &triangles.records, |pass| {
+    let radiance = shade(graph, frame, info, rate, (&source, &surfaces), &triangles.records, &|pass| {
         visible.bind(frame, pass);
         triangles.bind(pass);
     })?;
@@ -186,15 +187,15 @@ pub(crate) fn shade(
     rate: Option<&LowRate>,
     (source, surfaces): (&str, &clusters::Surfaces<'_>),
     records: &Records,
-    bind: impl Fn(&mut ComputePass<'_>),
+    bind: &dyn Fn(&mut dyn SourceSlots),
 ) -> Result<ImageHandle, TechniqueError> {
     if view::is_of_triangles(frame.view) {
         let samples = frame.samples;
-        return view::RecordSource { technique: info.id, tag: source, samples, records, bind: &bind }
+        return view::RecordSource { technique: info.id, tag: source, samples, records, bind }
             .record(graph, frame);
     }
     let source = format!("{source}{}", rate.map_or("", LowRate::tag));
-    multisample::shade(graph, frame, info, (&source, frame.samples), surfaces, |pass| {
+    multisample::shade(graph, frame, info, (&source, frame.samples), surfaces, &|pass| {
         if let Some(rate) = rate {
             rate.constants(pass);
         }
@@ -273,7 +274,7 @@ fn record_cached(
     let triangles = list.derivatives(graph, frame, info.id)?;
     let visible = Visible::Ids { ids: references, depth, samples: frame.samples };
     let source = format!("dais-{}{}", if wide { "wide" } else { "refs" }, visible.tag('-'));
-    shade(graph, frame, info, rate, (&source, &visible.surfaces()), &triangles, |pass| {
+    shade(graph, frame, info, rate, (&source, &visible.surfaces()), &triangles, &|pass| {
         visible.bind(frame, pass);
         triangles.bind(pass);
     })

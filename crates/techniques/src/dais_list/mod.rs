@@ -2,7 +2,7 @@
 
 // ORDER: 150
 
-use afterlight_graph::{BufferHandle, ComputePass, Graph, ImageHandle, ImageInfo, Load, RasterPass};
+use afterlight_graph::{BufferHandle, Graph, ImageHandle, ImageInfo, Load, RasterPass};
 
 use crate::{
     Answers, Exactness, Frame, Info, MULTIPLE_SAMPLES, Need, ParamInfo, ParamKind, Params, Source, Technique,
@@ -13,6 +13,7 @@ use crate::{
     dais::{self, Cache, FillPass},
     dais_multirate::{FULL_RATE, LowRate, SHARE},
     depth_prepass::FIRST_FRAGMENT,
+    frame::SourceSlots,
     gbuffer_list::{self, NOT_TAKEN},
     light_step,
     scene_gpu::DRAW_TRIANGLES,
@@ -91,12 +92,12 @@ impl Technique for DaisList {
         let rate = LowRate::chosen(frame, &INFO)?;
         let source = if frame.tessellate_px.is_some() { "dais-nodes-places" } else { "dais-nodes" };
         let stored = triangles.store(graph, frame)?;
-        let bind = |pass: &mut ComputePass<'_>| {
+        let bind = |pass: &mut dyn SourceSlots| {
             lists.bind(pass);
             stored.bind(pass);
         };
-        let surfaces = clusters::Surfaces::of_source(source, frame.samples, bind);
-        dais::shade(graph, frame, &INFO, rate.as_ref(), (source, &surfaces), stored.records(), bind)
+        let surfaces = clusters::Surfaces::of_source(source, frame.samples, |pass| bind(pass));
+        dais::shade(graph, frame, &INFO, rate.as_ref(), (source, &surfaces), stored.records(), &bind)
     }
 }
 
@@ -150,8 +151,10 @@ impl Lists {
     }
 
     /// Binds what `source_dais_list.glsl` reads.
-    fn bind(&self, pass: &mut ComputePass<'_>) {
-        pass.read("Heads", &self.heads).read("Nodes", &self.nodes).read("SampleDrops", &self.drops);
+    fn bind(&self, pass: &mut dyn SourceSlots) {
+        pass.read_buffer("Heads", &self.heads);
+        pass.read_buffer("Nodes", &self.nodes);
+        pass.read_buffer("SampleDrops", &self.drops);
         pass.constant("BOUNDED", u32::from(self.bounded));
     }
 }
@@ -223,7 +226,7 @@ impl Stored {
         }
     }
 
-    fn bind(&self, pass: &mut ComputePass<'_>) {
+    fn bind(&self, pass: &mut dyn SourceSlots) {
         match self {
             Self::Marked(buffer) => buffer.bind(pass),
             Self::Listed(records) => records.bind(pass),

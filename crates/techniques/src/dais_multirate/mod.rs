@@ -2,13 +2,14 @@
 
 // ORDER: 160
 
-use afterlight_graph::{ComputePass, Graph, ImageHandle};
+use afterlight_graph::{Graph, ImageHandle};
 
 use crate::{
     Answers, Exactness, Frame, Info, ParamInfo, ParamKind, Params, Source, Technique, TechniqueError,
     compute_raster,
     cost::{self, Cost, Workload},
     dais,
+    frame::SourceSlots,
     graph::gpu,
     light_step, view,
 };
@@ -108,7 +109,7 @@ impl LowRate {
     }
 
     /// Sets the specialization constants of `low_rate.glsl`.
-    pub fn constants(&self, pass: &mut ComputePass<'_>) {
+    pub fn constants(&self, pass: &mut dyn SourceSlots) {
         if !self.quads {
             pass.constant("CELL_PX", self.cell_px);
         }

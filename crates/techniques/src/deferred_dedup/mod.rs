@@ -57,7 +57,7 @@ impl Technique for DeferredDedup {
         let filled = multisample::fill_dedup(graph, frame, "deferred-dedup")?;
         let surfaces = filled.surfaces(frame);
         let source = ("dedup", frame.samples);
-        let radiance = multisample::shade(graph, frame, &INFO, source, &surfaces, |pass| filled.bind(pass))?;
+        let radiance = multisample::shade(graph, frame, &INFO, source, &surfaces, &|pass| filled.bind(pass))?;
         drop(surfaces);
         frame.hand_over_depth(filled.depth);
         Ok(radiance)

@@ -75,7 +75,7 @@ impl Technique for DeferredMsaa {
             _ => {
                 let surfaces = filled.surfaces(frame);
                 let source = ("msaa", frame.samples);
-                multisample::shade(graph, frame, &INFO, source, &surfaces, |pass| filled.bind(pass))?
+                multisample::shade(graph, frame, &INFO, source, &surfaces, &|pass| filled.bind(pass))?
             }
         };
         frame.hand_over_depth(filled.depth);

@@ -60,7 +60,7 @@ impl Technique for DeferredSsaa {
         let filled = multisample::fill_samples(graph, frame, "deferred-ssaa")?;
         let surfaces = filled.surfaces(frame);
         let source = ("ssaa", frame.samples);
-        let radiance = multisample::shade(graph, frame, &INFO, source, &surfaces, |pass| filled.bind(pass))?;
+        let radiance = multisample::shade(graph, frame, &INFO, source, &surfaces, &|pass| filled.bind(pass))?;
         drop(surfaces);
         frame.hand_over_depth(filled.depth);
         Ok(radiance)

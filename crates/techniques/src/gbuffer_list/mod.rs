@@ -233,16 +233,16 @@ impl Technique for GbufferList {
             Samples::Depth(depth) => clusters::Surfaces::of_depth(depth, layout.samples),
         };
         let radiance =
-            multisample::shade(graph, frame, &INFO, (source, layout.samples), &surfaces, |pass| {
+            multisample::shade(graph, frame, &INFO, (source, layout.samples), &surfaces, &|pass| {
                 for (name, value) in layout.constants() {
                     pass.constant(name, value);
                 }
                 pass.constant("KEEPS_ALL", u32::from(layout.keeps_all));
-                pass.read("Blocks", &lists.blocks);
+                pass.read_buffer("Blocks", &lists.blocks);
                 match &lists.samples {
-                    Samples::Depth(depth) => pass.read("gbuffer_depth", depth),
-                    Samples::Keys(keys) => pass.read("SampleKeys", keys),
-                };
+                    Samples::Depth(depth) => pass.read_image("gbuffer_depth", depth),
+                    Samples::Keys(keys) => pass.read_buffer("SampleKeys", keys),
+                }
             })?;
         drop(surfaces);
         if let Samples::Depth(depth) = lists.samples {

@@ -29,23 +29,34 @@ const uint MOST_NEEDED = 0xf0000000u;
 
 layout(location = 0) flat in uint light_index;
 
+// Surfaces at the samples lie near the ray through the pixel's centre, by at most half its width at the farther end.
+bool reaches_ray(vec4 sphere, vec2 ndc, float nearest_m, float farthest_m) {
+    float farthest_depth = depth_from_distance(farthest_m);
+    vec3 far = position_from_depth(ndc, farthest_depth);
+    vec3 between = far - position_from_depth(ndc, depth_from_distance(nearest_m));
+    float along = clamp(dot(far - sphere.xyz, between) / max(dot(between, between), 1e-20), 0.0, 1.0);
+    vec3 to_light = sphere.xyz - (far - along * between);
+    float reach_m = sphere.w + distance(far, position_from_depth(ndc + 1.0 / vec2(frame.size_px), farthest_depth));
+    return dot(to_light, to_light) <= reach_m * reach_m;
+}
+
+// The one surface of a pixel is a point: between the ends of its head is room for rounding alone.
+bool reaches_point(vec4 sphere, vec2 ndc, float nearest_m, float farthest_m) {
+    vec3 point = position_from_depth(ndc, depth_from_distance(0.5 * (nearest_m + farthest_m)));
+    float reach_m = sphere.w + (farthest_m - nearest_m);
+    vec3 to_light = sphere.xyz - point;
+    return dot(to_light, to_light) <= reach_m * reach_m;
+}
+
 bool is_within_range(uint pixel) {
-    vec4 sphere = light_sphere(light_index);
-    vec2 range_m = vec2(light_heads[pixel].nearest_m, light_heads[pixel].farthest_m);
-    if (range_m.y < range_m.x) {
+    float nearest_m = light_heads[pixel].nearest_m, farthest_m = light_heads[pixel].farthest_m;
+    if (farthest_m < nearest_m) {
         return false;
     }
+    vec4 sphere = light_sphere(light_index);
     vec2 ndc = ndc_from_pixel(uvec2(gl_FragCoord.xy));
-    vec3 near = position_from_depth(ndc, depth_from_distance(range_m.x));
-    vec3 between = position_from_depth(ndc, depth_from_distance(range_m.y)) - near;
-    float along = clamp(dot(sphere.xyz - near, between) / max(dot(between, between), 1e-20), 0.0, 1.0);
-    vec3 to_light = sphere.xyz - (near + along * between);
-    float reach_m = sphere.w;
-    if (SAMPLED != 0u) {
-        vec2 corner = ndc + 1.0 / vec2(frame.size_px);
-        reach_m += distance(near + between, position_from_depth(corner, depth_from_distance(range_m.y)));
-    }
-    return dot(to_light, to_light) <= reach_m * reach_m;
+    return SAMPLED != 0u ? reaches_ray(sphere, ndc, nearest_m, farthest_m)
+                         : reaches_point(sphere, ndc, nearest_m, farthest_m);
 }
 
 void append(uint pixel) {

@@ -26,8 +26,10 @@ pub(crate) const CELLS: &[ParamInfo] =
 /// Which lights a surface visits, for sources of several surfaces a pixel.
 pub const LIGHTS: ParamInfo = ParamInfo {
     key: KEY,
-    summary: "lights that a surface visits: all, those on the list of its pixel (lists), its tile (tiles; tiles25 with 32 bits of depth) or its cluster, or those that a tree over the lights leads to; auto: all where they are few, else clusters",
-    kind: ParamKind::Choice { values: &["auto", "all", "lists", "tiles", "tiles25", "clusters", "tree"] },
+    summary: "lights that a surface visits: all, those on the list of its pixel (lists), its tile (tiles; tiles25 with 32 bits of depth) or its cluster, or those that a tree over the lights leads to; volumes: each light's volume adds it; auto: all where they are few, else clusters",
+    kind: ParamKind::Choice {
+        values: &["auto", "all", "volumes", "lists", "tiles", "tiles25", "clusters", "tree"],
+    },
     default: "auto",
 };
 

@@ -12,16 +12,16 @@ mod visible;
 
 pub use visible::Visible;
 
-use afterlight_graph::{BufferHandle, ComputePass, Graph, ImageHandle, Load, RasterPass, gpu::vk};
+use afterlight_graph::{BufferHandle, Graph, ImageHandle, Load, RasterPass, gpu::vk};
 
 use crate::{
     Info, clusters,
     error::TechniqueError,
-    frame::{Frame, Slots},
+    frame::{Frame, Slots, SourceSlots},
     geometry::Surfaces,
     light_step::LightStep,
     technique::Need,
-    view,
+    view, volumes,
 };
 
 /// Positions are reconstructed where the samples stand.
@@ -49,7 +49,7 @@ impl SampleBuffer {
     }
 
     /// Binds what a source of surfaces reads.
-    pub fn bind(&self, pass: &mut impl Slots) {
+    pub fn bind(&self, pass: &mut (impl Slots + ?Sized)) {
         pass.read_image("gbuffer_depth", &self.depth);
         for (slot, image) in &self.images {
             pass.read_image(slot, image);
@@ -165,7 +165,7 @@ pub fn shade(
     info: &Info,
     (source, samples): (&str, u32),
     surfaces: &clusters::Surfaces<'_>,
-    bind: impl FnOnce(&mut ComputePass<'_>),
+    bind: &dyn Fn(&mut dyn SourceSlots),
 ) -> Result<ImageHandle, TechniqueError> {
     let technique = info.id;
     let step = LightStep::build(graph, frame, info, surfaces)?;
@@ -189,6 +189,66 @@ pub fn shade(
     step.bind(frame, &mut pass);
     let radiance = pass.write("hdr", radiance);
     pass.dispatch(frame.groups(shader.reflection.local_size[0]));
+    pass.finish();
+    match step {
+        LightStep::None => {
+            // Lights know nothing of what indirect light shares.
+            let source = source.trim_end_matches("-grid").trim_end_matches("-quads");
+            let fragment = format!("multisample/volume.frag#{source}");
+            add_volumes(graph, frame, (technique, &fragment), radiance, &|pass| {
+                pass.constant("SAMPLES", samples);
+                bind(pass);
+            })
+        }
+        _ => Ok(radiance),
+    }
+}
+
+/// A raster pass as a source of surfaces is bound to it: constants are those of its draws.
+struct VolumePass<'p, 'g> {
+    pass: &'p mut RasterPass<'g>,
+    constants: Vec<(String, u32)>,
+}
+
+impl Slots for VolumePass<'_, '_> {
+    fn read_buffer(&mut self, slot: &str, buffer: &BufferHandle) {
+        self.pass.read_buffer(slot, buffer);
+    }
+    fn read_image(&mut self, slot: &str, image: &ImageHandle) {
+        self.pass.read_image(slot, image);
+    }
+    fn textures(&mut self, set: &afterlight_graph::gpu::DescriptorSet) {
+        self.pass.textures(set);
+    }
+}
+
+impl SourceSlots for VolumePass<'_, '_> {
+    fn constant(&mut self, name: &str, value: u32) {
+        self.constants.push((name.to_owned(), value));
+    }
+}
+
+/// Declares the pass `technique/lights`: each light's volume adds by `fragment` what it gives the surfaces of a pixel.
+///
+/// # Errors
+/// A shader that is not compiled in.
+pub(crate) fn add_volumes(
+    graph: &mut Graph,
+    frame: &Frame<'_>,
+    (technique, fragment): (&str, &str),
+    radiance: ImageHandle,
+    bind: &dyn Fn(&mut dyn SourceSlots),
+) -> Result<ImageHandle, TechniqueError> {
+    if view::number(frame.view) > 0 {
+        return Ok(radiance);
+    }
+    let mut pass = graph.raster(&format!("{technique}/lights"));
+    frame.bind_scene(&mut pass);
+    let radiance = pass.color(radiance, Load::Keep);
+    let mut bound = VolumePass { pass: &mut pass, constants: Vec::new() };
+    bind(&mut bound);
+    let constants = bound.constants;
+    volumes::draw_all_by(frame, &mut pass, fragment, (afterlight_graph::DepthTest::OFF, &constants))?;
     pass.finish();
     Ok(radiance)
 }

@@ -24,6 +24,13 @@ layout(constant_id = 9) const uint VIEW = 0u;
 uint shaded_count;  // surfaces shaded
 uint weight_sum;
 
+// What the surfaces of a pixel give it, from the sum over them; there must be one.
+vec3 of_surfaces(vec3 weighted_radiance) {
+    // Samples that a list dropped take the colour of the others; else the factor is exactly 1.
+    float share = float(SAMPLES - source_background) / float(weight_sum);
+    return weighted_radiance * share / float(SAMPLES);
+}
+
 // Radiance of a pixel from the sum over its surfaces, or what a view shows of it.
 vec3 resolved(vec3 weighted_radiance) {
     if (VIEW == 1u) {
@@ -42,7 +49,5 @@ vec3 resolved(vec3 weighted_radiance) {
     if (weight_sum == 0u) {
         return frame.background_radiance;
     }
-    // Samples that a list dropped take the colour of the others; else the factor is exactly 1.
-    float of_surfaces = float(SAMPLES - source_background) / float(weight_sum);
-    return (weighted_radiance * of_surfaces + float(source_background) * frame.background_radiance) / float(SAMPLES);
+    return of_surfaces(weighted_radiance) + float(source_background) * frame.background_radiance / float(SAMPLES);
 }

@@ -90,7 +90,7 @@ impl Visible {
     }
 
     /// Binds what shaders read of it. Slots that no shader of the pass has stay unused.
-    pub fn bind(&self, frame: &Frame<'_>, pass: &mut impl Slots) {
+    pub fn bind(&self, frame: &Frame<'_>, pass: &mut (impl Slots + ?Sized)) {
         match self {
             Self::Ids { ids, depth, .. } => {
                 pass.read_image("ids", ids);

@@ -33,7 +33,7 @@ pub struct Records {
 
 impl Records {
     /// Binds what `triangle_buffer/interpolate.glsl` reads.
-    pub fn bind(&self, pass: &mut impl Slots) {
+    pub fn bind(&self, pass: &mut (impl Slots + ?Sized)) {
         pass.read_buffer("TriangleBuffer", &self.words);
     }
 }
@@ -49,7 +49,7 @@ pub struct TriangleBuffer {
 
 impl TriangleBuffer {
     /// Binds what `triangle_buffer/index.glsl` and `triangle_buffer/interpolate.glsl` read.
-    pub fn bind(&self, pass: &mut impl Slots) {
+    pub fn bind(&self, pass: &mut (impl Slots + ?Sized)) {
         self.records.bind(pass);
         pass.read_buffer("VisibleBits", &self.bits);
         pass.read_buffer("VisibleBefore", &self.before);

@@ -3,7 +3,13 @@
 use afterlight_graph::{ComputePass, Graph, ImageHandle, Load, gpu::vk};
 
 use super::TEXTURE_ERROR;
-use crate::{error::TechniqueError, frame::Frame, geometry::Surfaces, scene::Aabb, triangle_buffer::Records};
+use crate::{
+    error::TechniqueError,
+    frame::{Frame, SourceSlots},
+    geometry::Surfaces,
+    scene::Aabb,
+    triangle_buffer::Records,
+};
 
 /// Name, after the technique's, of the buffer of errors that [`RecordSource::record`] keeps: two 32-bit floats a
 /// pixel, rows from the top. Distance of the positions in a scene whose longest side is 2; largest difference of a channel of
@@ -28,7 +34,7 @@ pub struct RecordSource<'a> {
     /// The records.
     pub records: &'a Records,
     /// Binds what it reads, the records as well.
-    pub bind: &'a dyn Fn(&mut ComputePass<'_>),
+    pub bind: &'a dyn Fn(&mut dyn SourceSlots),
 }
 
 impl RecordSource<'_> {

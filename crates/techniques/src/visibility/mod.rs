@@ -2,15 +2,17 @@
 
 // ORDER: 70
 
-use afterlight_graph::{ComputePass, Graph, ImageHandle, Load, gpu::vk};
+use afterlight_graph::{Graph, ImageHandle, Load, gpu::vk};
 
 use crate::{
     Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError,
     clusters::Surfaces,
     compute_raster,
     cost::{Cost, Workload, visibility_buffer},
+    frame::SourceSlots,
     geometry,
     light_step::{self, LightStep},
+    multisample::add_volumes,
 };
 
 /// The technique.
@@ -77,10 +79,9 @@ impl Technique for Visibility {
         let depth = pass.depth(depth, Load::Clear(0.0));
         surfaces.draw(frame, &mut pass);
         pass.finish();
-        let radiance =
-            shade(graph, frame, "visibility/shade.comp", &Surfaces::of_depth(&depth, 1), |pass| {
-                pass.read("ids", &ids);
-            })?;
+        let radiance = shade(graph, frame, "", &Surfaces::of_depth(&depth, 1), &|pass| {
+            pass.read_image("ids", &ids);
+        })?;
         frame.hand_over_depth(depth);
         Ok(radiance)
     }
@@ -89,23 +90,25 @@ impl Technique for Visibility {
 /// The same from triangles that compute has found.
 fn shade_keys(graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
     let keys = compute_raster::rasterize(graph, frame, &INFO, 1)?;
-    shade(graph, frame, "visibility/shade.comp#keys", &Surfaces::of_keys(&keys, 1), |pass| {
-        pass.constant("SAMPLES", 1u32);
-        pass.read("SampleKeys", &keys).read("DrawCommands", &frame.buffers.commands);
+    shade(graph, frame, "#keys", &Surfaces::of_keys(&keys, 1), &|pass| {
+        pass.constant("SAMPLES", 1);
+        pass.read_buffer("SampleKeys", &keys);
+        pass.read_buffer("DrawCommands", &frame.buffers.commands);
     })
 }
 
-/// Lists lights as the technique's `lights` asks, and shades what `surfaces` show.
+/// Lists lights as the technique's `lights` asks, and shades what `surfaces` show by the variants `tag` of its shaders.
 fn shade(
     graph: &mut Graph,
     frame: &Frame<'_>,
-    shader: &str,
+    tag: &str,
     surfaces: &Surfaces<'_>,
-    bind: impl FnOnce(&mut ComputePass<'_>),
+    bind: &dyn Fn(&mut dyn SourceSlots),
 ) -> Result<ImageHandle, TechniqueError> {
     let step = LightStep::build(graph, frame, &INFO, surfaces)?;
     let radiance = graph.image("visibility/radiance", frame.image_info(vk::Format::R16G16B16A16_SFLOAT));
-    let mut pass = frame.compute(graph, "visibility/shade", &frame.shader(shader)?);
+    let mut pass =
+        frame.compute(graph, "visibility/shade", &frame.shader(&format!("visibility/shade.comp{tag}"))?);
     bind(&mut pass);
     step.bind(frame, &mut pass);
     for (constant, value) in step.constants() {
@@ -114,5 +117,9 @@ fn shade(
     let radiance = pass.write("hdr", radiance);
     pass.dispatch(frame.groups(8));
     pass.finish();
-    Ok(radiance)
+    let volumes = format!("visibility/volume.frag{tag}");
+    match step {
+        LightStep::None => add_volumes(graph, frame, (INFO.id, &volumes), radiance, bind),
+        _ => Ok(radiance),
+    }
 }

@@ -155,11 +155,36 @@ pub fn draw_all(
     targets: usize,
 ) -> Result<(), TechniqueError> {
     draw_unbounded(frame, pass, fragment, targets)?;
-    let bounded = frame.lights.count - frame.lights.unbounded_count;
+    draw_bounded(frame, pass, fragment, targets, (BEHIND_SURFACE, &[]))
+}
+
+/// The same into one attachment by a fragment shader with specialization constants, and with another depth test.
+///
+/// # Errors
+/// A shader that is not compiled in.
+pub(crate) fn draw_all_by(
+    frame: &Frame<'_>,
+    pass: &mut RasterPass<'_>,
+    fragment: &str,
+    (depth, constants): (DepthTest, &[(String, u32)]),
+) -> Result<(), TechniqueError> {
+    draw_unbounded_by(frame, pass, fragment, 1, constants)?;
+    draw_bounded(frame, pass, fragment, 1, (depth, constants))
+}
+
+fn draw_bounded(
+    frame: &Frame<'_>,
+    pass: &mut RasterPass<'_>,
+    fragment: &str,
+    targets: usize,
+    (depth, constants): (DepthTest, &[(String, u32)]),
+) -> Result<(), TechniqueError> {
+    let bounded = frame.lights.bounded_count();
     if bounded > 0 {
         let added = vec![Blend::ADD; targets];
-        let state = volume_state(frame, Some(fragment), vk::CullModeFlags::FRONT, added)?;
-        pass.draw(volume_draw(frame, state.depth(BEHIND_SURFACE), frame.lights.unbounded_count, bounded));
+        let mut state = volume_state(frame, Some(fragment), vk::CullModeFlags::FRONT, added)?;
+        state.constants.extend_from_slice(constants);
+        pass.draw(volume_draw(frame, state.depth(depth), frame.lights.unbounded_count, bounded));
     }
     Ok(())
 }
@@ -174,14 +199,25 @@ pub fn draw_unbounded(
     fragment: &str,
     targets: usize,
 ) -> Result<(), TechniqueError> {
+    draw_unbounded_by(frame, pass, fragment, targets, &[])
+}
+
+fn draw_unbounded_by(
+    frame: &Frame<'_>,
+    pass: &mut RasterPass<'_>,
+    fragment: &str,
+    targets: usize,
+    constants: &[(String, u32)],
+) -> Result<(), TechniqueError> {
     if frame.lights.unbounded_count > 0 {
-        let state = state(
+        let mut state = state(
             frame,
             "volumes/volume.vert#full-screen",
             Some(fragment),
             vk::CullModeFlags::NONE,
             vec![Blend::ADD; targets],
         )?;
+        state.constants.extend_from_slice(constants);
         let call = DrawCall::Direct {
             vertices: 3,
             instances: frame.lights.unbounded_count,
