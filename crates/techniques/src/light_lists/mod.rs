@@ -31,6 +31,7 @@ pub struct LightLists {
     heads: BufferHandle,
     nodes: BufferHandle,
     tree: LightBvh,
+    sampled: bool,
 }
 
 /// Declares `technique/heads` and `technique/lists`: each light with an end is appended to the list of every pixel that it reaches
@@ -57,23 +58,24 @@ pub fn build(
 
     let bounded = frame.lights.bounded_count();
     if bounded > 0 {
-        let test = depth.map_or(DepthTest::OFF, |_| volumes::BEHIND_SURFACE);
-        let state = volumes::volume_state(
-            frame,
-            Some("light_lists/append.frag"),
-            vk::CullModeFlags::FRONT,
-            Vec::new(),
-        )?
-        .depth(test)
-        .constant("NODE_CAPACITY", capacity)
-        .constant("SAMPLED", u32::from(surfaces.samples() > 1));
+        let (test, shader) = match depth {
+            Some(_) => (volumes::BEHIND_SURFACE, "light_lists/append.frag#one"),
+            None => (DepthTest::OFF, "light_lists/append.frag"),
+        };
+        let state = volumes::volume_state(frame, Some(shader), vk::CullModeFlags::FRONT, Vec::new())?
+            .depth(test)
+            .constant("NODE_CAPACITY", capacity)
+            .constant("SAMPLED", u32::from(surfaces.samples() > 1));
         let mut pass = graph.raster(&format!("{}/lists", info.id));
         frame.bind_scene(&mut pass);
         heads = pass.write("LightHeads", heads);
         nodes = pass.write("LightNodes", nodes);
         count = pass.write("LightNodeCount", count);
         match depth {
-            Some(depth) => _ = pass.depth_read_only(depth),
+            Some(depth) => {
+                pass.read_image("light_lists_depth", depth);
+                pass.depth_read_only(depth);
+            }
             None => _ = pass.extent(frame.width_px, frame.height_px),
         }
         pass.draw(volumes::volume_draw(frame, state, frame.lights.unbounded_count, bounded));
@@ -82,7 +84,7 @@ pub fn build(
         nodes = graph.clear_buffer(&format!("{}/clear light nodes", info.id), nodes, 0);
     }
     frame.watch(graph, COUNTER, &count, capacity, fixed.is_some());
-    Ok(LightLists { heads, nodes, tree })
+    Ok(LightLists { heads, nodes, tree, sampled: surfaces.samples() > 1 })
 }
 
 /// Heads of empty lists, and where the surfaces of each pixel lie.
@@ -105,6 +107,11 @@ fn empty_heads(
 }
 
 impl LightLists {
+    /// Specialization constant of what includes `lists.glsl`.
+    pub fn constant(&self) -> (&'static str, u32) {
+        ("LISTS_SAMPLED", u32::from(self.sampled))
+    }
+
     /// Binds what `lists.glsl` reads.
     pub fn bind(&self, frame: &Frame<'_>, pass: &mut impl Slots) {
         pass.read_buffer("LightHeads", &self.heads);

@@ -157,13 +157,13 @@ impl LightStep {
     /// Specialization constants of what includes `radiance.glsl`.
     pub fn constants(&self) -> Vec<(String, u32)> {
         let (number, more) = match self {
-            Self::All => (0, &[][..]),
-            Self::Cells(cells) => (1, cells.constants()),
-            Self::Tree(_) => (2, &[][..]),
-            Self::Lists(_) => (3, &[][..]),
-            Self::None => (4, &[][..]),
+            Self::All => (0, Vec::new()),
+            Self::Cells(cells) => (1, cells.constants().to_vec()),
+            Self::Tree(_) => (2, Vec::new()),
+            Self::Lists(lists) => (3, vec![lists.constant()]),
+            Self::None => (4, Vec::new()),
         };
-        let all = std::iter::once(("LIGHT_STEP", number)).chain(more.iter().copied());
+        let all = std::iter::once(("LIGHT_STEP", number)).chain(more);
         all.map(|(name, value)| (name.to_owned(), value)).collect()
     }
 }
