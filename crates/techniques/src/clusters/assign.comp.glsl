@@ -37,6 +37,10 @@ shared uint group_bits;
 shared uint kept[KEPT_MAX];
 shared uint shared_first;
 
+uint list_capacity() {
+    return uint(cell_lists.length());
+}
+
 uint lane() {
     return gl_SubgroupID * gl_SubgroupSize + gl_SubgroupInvocationID;
 }
@@ -93,7 +97,7 @@ void add_lights(inout Found found, uint leaf, uint bits) {
             if (at < KEPT_MAX) {
                 kept[at] = light;
             }
-        } else if (found.first + at < LIST_CAPACITY) {
+        } else if (found.first + at < list_capacity()) {
             cell_lists[found.first + at] = light;
         }
     }
@@ -128,7 +132,7 @@ void find_lights(CellBounds b, inout Found found) {
 // Room for a list: where it begins.
 uint take_room(uint count) {
     uint first = atomicAdd(entries_needed, count);
-    uint room = first < LIST_CAPACITY ? min(count, LIST_CAPACITY - first) : 0u;
+    uint room = first < list_capacity() ? min(count, list_capacity() - first) : 0u;
     if (room < count) {
         // Marks a sum that has passed 2^32 and looks small.
         atomicOr(entries_dropped, count - room);
@@ -142,7 +146,7 @@ void write_list(uint place) {
     find_lights(b, found);
     if (lane() == 0u) {
         shared_first = take_room(found.count);
-        list_ends[place] = min(uvec2(shared_first, shared_first + found.count), LIST_CAPACITY);
+        list_ends[place] = min(uvec2(shared_first, shared_first + found.count), list_capacity());
     }
     barrier();
     uint first = shared_first, count = found.count;
@@ -150,7 +154,7 @@ void write_list(uint place) {
         found = Found(0u, true, first);
         find_lights(b, found);
     } else {
-        for (uint i = lane(); i < count && first + i < LIST_CAPACITY; i += TREE_WIDTH) {
+        for (uint i = lane(); i < count && first + i < list_capacity(); i += TREE_WIDTH) {
             cell_lists[first + i] = kept[i];
         }
     }
@@ -158,7 +162,7 @@ void write_list(uint place) {
 }
 
 void main() {
-    uint end = min(cells_needed, CELL_CAPACITY);
+    uint end = min(cells_needed, uint(cells.length()));
     for (uint place = gl_WorkGroupID.x; place < end; place += gl_NumWorkGroups.x) {
         write_list(place);
     }

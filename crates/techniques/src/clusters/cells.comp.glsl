@@ -19,6 +19,11 @@ layout(set = 0, binding = 50, scalar) buffer CellCount {
     uint cells_dropped;
 };
 
+// Capacities are lengths of buffers and no constants: a frame that is recorded again with room keeps its pipelines.
+uint cell_capacity() {
+    return uint(cells.length());
+}
+
 const uint MOST_WORDS = 8u;
 shared uint tile_bits[MOST_WORDS];
 shared uint tile_before[MOST_WORDS + 1u];
@@ -94,8 +99,8 @@ void place_cells(uint tile) {
     }
     uint first = count > 0u ? atomicAdd(cells_needed, count) : 0u;
     uint end = first + count;
-    if (end > CELL_CAPACITY) {
-        atomicAdd(cells_dropped, end - max(first, CELL_CAPACITY));
+    if (end > cell_capacity()) {
+        atomicAdd(cells_dropped, end - max(first, cell_capacity()));
     }
     for (uint w = 0u; w < WORDS; ++w) {
         tile_before[w] += first;
@@ -104,7 +109,7 @@ void place_cells(uint tile) {
 }
 
 void write_cell(uint place, Cell cell) {
-    if (place < CELL_CAPACITY) {
+    if (place < cell_capacity()) {
         cells[place] = cell;
     }
 }

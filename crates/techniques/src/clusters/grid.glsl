@@ -20,8 +20,6 @@ layout(constant_id = 40) const uint DIVISION = CLUSTERS;
 layout(constant_id = 41) const uint LIGHT_TILE_PX = 32u;
 layout(constant_id = 42) const uint SLICES = 32u;
 layout(constant_id = 43) const uint LOGARITHMIC = 1u;
-layout(constant_id = 44) const uint CELL_CAPACITY = 0u;
-layout(constant_id = 45) const uint LIST_CAPACITY = 0u;
 
 const uint WORDS = DIVISION == CLUSTERS ? (SLICES + 31u) / 32u : 1u;
 

@@ -27,7 +27,7 @@ bool cell_of(uvec2 pixel, float distance_m, out uint place) {
     if (DIVISION != CLUSTERS) {
         uvec2 word = cell_words[tile];
         place = word.y;
-        if (word.x == 0u || place >= CELL_CAPACITY) {
+        if (word.x == 0u || place >= uint(cells.length())) {
             return false;
         }
         Cell cell = cells[place];
@@ -39,7 +39,7 @@ bool cell_of(uvec2 pixel, float distance_m, out uint place) {
     uint bit = 1u << (slice & 31u);
     place = word.y + uint(bitCount(word.x & (bit - 1u)));
     bool within = distance_m >= frame.distance_range_m.x && distance_m <= frame.distance_range_m.y;
-    return within && (word.x & bit) != 0u && place < CELL_CAPACITY;
+    return within && (word.x & bit) != 0u && place < uint(cells.length());
 }
 
 // A colour of its own for the cell of a surface; white where none holds it.

@@ -116,7 +116,7 @@ impl Division {
         tiles(frame.width_px) * tiles(frame.height_px)
     }
 
-    /// Specialization constants of `grid.glsl` but for capacities.
+    /// Specialization constants of `grid.glsl`.
     fn constants(self) -> [(&'static str, u32); 4] {
         let (number, logarithmic) = match self {
             Self::Clusters(grid) => (0, grid.logarithmic),
@@ -269,8 +269,7 @@ impl<'a> Stage<'a> {
         ] {
             frame.check_binding(technique, &what, bytes)?;
         }
-        let mut constants = division.constants().to_vec();
-        constants.extend([("CELL_CAPACITY", cell_capacity), ("LIST_CAPACITY", list_capacity)]);
+        let constants = division.constants().to_vec();
         Ok(Self { frame, technique, constants, tiles: tiles as u32, words, cell_capacity, list_capacity })
     }
 
