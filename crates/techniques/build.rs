@@ -26,7 +26,9 @@ fn build() -> Result<(), Box<dyn Error>> {
     folders.retain(|path| path.is_dir());
     folders.sort();
     fs::write(out_dir.join("registry.rs"), registry(&folders)?)?;
-    let mut builder = Builder::new().include_dir(&src).layouts(structs::LAYOUTS);
+    // Where the stages' GLSL is: their build script tells.
+    let stages = PathBuf::from(env::var("DEP_AFTERLIGHT_STAGES_GLSL")?);
+    let mut builder = Builder::new().include_dir(&src).include_dir(stages).layouts(structs::LAYOUTS);
     for folder in &folders {
         if folder.join(manifest::FILE_NAME).is_file() {
             builder = builder.folder(folder_name(folder), folder);

@@ -6,21 +6,21 @@ use std::cell::RefCell;
 use afterlight_graph::{BufferHandle, Executor, Graph, ResourceId};
 use serde::Serialize;
 
-use crate::{error::TechniqueError, frame::Frame};
+use crate::{Frame, TechniqueError};
 
 /// A capacity that leaves less than this unused is kept; one that leaves more than three quarters of itself unused as well is
 /// cut.
 const SLACK: u32 = 4096;
 
 /// Room beyond what a frame needed, eighths of it, where the next frame of the same view needs the same.
-pub(crate) const STEADY: u32 = 1;
+pub const STEADY: u32 = 1;
 /// The same where what is needed depends on the order in which the device runs threads: 133,822 triangles through a cache with
 /// locks after 103,000 in the frame before (NVIDIA H200).
-pub(crate) const UNSTEADY: u32 = 8;
+pub const UNSTEADY: u32 = 8;
 
 /// Elements that the first frame of a view has room for: that frame is run to count what the view needs, and its memory is given
 /// back. So few that every view of a real scene needs a hundred times as many, and what a shortage does is seen at once.
-pub(crate) const FIRST_GUESS: u32 = 16;
+pub const FIRST_GUESS: u32 = 16;
 
 /// Frames that are run to count what is [`UNSTEADY`]: the first after a pause needs least (25,000 triangles, then 57,688).
 const UNSTEADY_FRAMES: u32 = 4;
@@ -41,7 +41,7 @@ pub struct Counter {
 }
 
 /// The most of what frames counted; `before` may be empty.
-pub(crate) fn most(before: Vec<Counter>, last: Vec<Counter>) -> Vec<Counter> {
+pub fn most(before: Vec<Counter>, last: Vec<Counter>) -> Vec<Counter> {
     if before.is_empty() {
         return last;
     }
@@ -51,7 +51,7 @@ pub(crate) fn most(before: Vec<Counter>, last: Vec<Counter>) -> Vec<Counter> {
 
 /// A counter on the device: two words, what was asked for and what was dropped.
 #[derive(Clone, Debug)]
-pub(crate) struct Demand {
+pub struct Demand {
     name: &'static str,
     resource: ResourceId,
     capacity: u32,
@@ -78,7 +78,7 @@ impl Demand {
 
 /// Capacities known from the frames before, and the counters that the frame being recorded has.
 #[derive(Default)]
-pub(crate) struct Capacities {
+pub struct Capacities {
     known: Vec<(String, u32)>,
     demands: RefCell<Vec<Demand>>,
 }
@@ -141,7 +141,7 @@ impl Frame<'_> {
     }
 
     /// As [`Self::watch`], with another share of room beyond what was needed: [`STEADY`] or [`UNSTEADY`].
-    pub(crate) fn watch_with(
+    pub fn watch_with(
         &self,
         graph: &mut Graph,
         name: &'static str,

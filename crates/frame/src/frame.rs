@@ -1,7 +1,5 @@
 //! What a technique is given to record a frame.
 
-use std::cell::RefCell;
-
 use afterlight_graph::{
     BufferHandle, Graph, ImageHandle, ImageInfo,
     gpu::{self, vk},
@@ -9,15 +7,11 @@ use afterlight_graph::{
 use afterlight_shader::Shader;
 
 use crate::{
-    SHADERS,
+    Board, Slots, TechniqueError,
     capacity::Capacities,
-    error::TechniqueError,
-    indirect::Rsm,
-    lights::LightList,
     params::Params,
-    scene_gpu::{BUCKETS, SceneGpu},
-    shadow::Shadow,
-    view,
+    scene::{BUCKETS, SceneGpu, lights::SceneLights},
+    views,
 };
 
 /// A frame to be recorded: the scene on the device, its buffers imported into the graph, sizes and parameters.
@@ -33,8 +27,8 @@ pub struct Frame<'a> {
     /// The scene.
     pub scene: &'a SceneGpu,
     /// The lights.
-    pub lights: &'a LightList,
-    /// What to show: [`crate::view::FINAL`] or one of the technique's views.
+    pub lights: &'a SceneLights,
+    /// What to show: [`crate::views::FINAL`] or one of the technique's views.
     pub view: &'a str,
     /// Length on screen of the edges that surfaces are tessellated to, pixels; `None` is no tessellation.
     pub tessellate_px: Option<f32>,
@@ -44,18 +38,18 @@ pub struct Frame<'a> {
     pub clip_from_world: glam::Mat4,
     /// Radiance of pixels without a surface.
     pub background_radiance: [f32; 3],
-    pub(crate) buffers: FrameBuffers,
-    pub(crate) extra_shaders: &'a [Shader],
-    pub(crate) device: &'a gpu::Device,
-    pub(crate) capacities: &'a Capacities,
+    pub buffers: SceneBuffers,
+    pub shaders: &'a [&'a [Shader]],
+    pub device: &'a gpu::Device,
+    pub capacities: &'a Capacities,
     /// Draws that the eye has in view, by bucket, in drawing order.
-    pub(crate) visible: &'a [Vec<u32>; BUCKETS],
-    /// What [`Frame::hand_over_depth`] was given.
-    pub(crate) opaque_depth: RefCell<Option<ImageHandle>>,
+    pub visible: &'a [Vec<u32>; BUCKETS],
+    /// What the parts of the frame hand on.
+    pub board: Board,
 }
 
 /// Buffers of the scene and the frame as the graph knows them.
-pub(crate) struct FrameBuffers {
+pub struct SceneBuffers {
     pub frame: BufferHandle,
     pub draws: BufferHandle,
     pub draw_data: ImageHandle,
@@ -70,51 +64,7 @@ pub(crate) struct FrameBuffers {
     pub command_counts: BufferHandle,
     pub volume: BufferHandle,
     pub volume_indices: BufferHandle,
-    /// What indirect light is gathered from; none while it is made.
-    pub rsm: Option<Rsm>,
-    /// What a light reaches; none while it and what indirect light is gathered from are made.
-    pub shadow: Option<Shadow>,
 }
-
-/// What binds resources to the slots of a pass: raster or compute.
-pub trait Slots {
-    /// Binds a buffer that shaders read.
-    fn read_buffer(&mut self, slot: &str, buffer: &BufferHandle);
-    /// Binds an image that shaders read.
-    fn read_image(&mut self, slot: &str, image: &ImageHandle);
-    /// Binds the scene's textures.
-    fn textures(&mut self, set: &gpu::DescriptorSet);
-}
-
-/// What a source of surfaces is bound to: the slots of a pass, and specialization constants of its shaders.
-pub trait SourceSlots: Slots {
-    /// Sets a specialization constant.
-    fn constant(&mut self, name: &str, value: u32);
-}
-
-impl SourceSlots for afterlight_graph::ComputePass<'_> {
-    fn constant(&mut self, name: &str, value: u32) {
-        afterlight_graph::ComputePass::constant(self, name, value);
-    }
-}
-
-macro_rules! slots {
-    ($pass:ident) => {
-        impl Slots for afterlight_graph::$pass<'_> {
-            fn read_buffer(&mut self, slot: &str, buffer: &BufferHandle) {
-                self.read(slot, buffer);
-            }
-            fn read_image(&mut self, slot: &str, image: &ImageHandle) {
-                self.read(slot, image);
-            }
-            fn textures(&mut self, set: &gpu::DescriptorSet) {
-                self.texture_set(set);
-            }
-        }
-    };
-}
-slots!(RasterPass);
-slots!(ComputePass);
 
 impl Frame<'_> {
     /// A shader of the program by name, `folder/file.stage#tag`.
@@ -122,11 +72,9 @@ impl Frame<'_> {
     /// # Errors
     /// [`TechniqueError::UnknownShader`].
     pub fn shader(&self, name: &str) -> Result<Shader, TechniqueError> {
-        self.extra_shaders
-            .iter()
-            .find(|s| s.name == *name)
+        let mut all = self.shaders.iter().copied().flatten();
+        all.find(|shader| shader.name == *name)
             .cloned()
-            .or_else(|| SHADERS.iter().find(|s| s.name == *name).cloned())
             .ok_or_else(|| TechniqueError::UnknownShader { name: name.to_owned() })
     }
 
@@ -143,12 +91,6 @@ impl Frame<'_> {
     /// Whether a debug view is to be shown.
     pub fn shows(&self, view: &str) -> bool {
         self.view == view
-    }
-
-    /// Leaves the depth of the frame's opaque surfaces to the passes after the technique: of the same draws by the same vertex path, at
-    /// the frame's size and samples. Without it, or where it is of another size, passes that need it draw it again.
-    pub fn hand_over_depth(&self, depth: ImageHandle) {
-        *self.opaque_depth.borrow_mut() = Some(depth);
     }
 
     /// Brings a small table that a technique made on the CPU into the graph, as a storage buffer that indirect calls
@@ -187,11 +129,6 @@ impl Frame<'_> {
         }
     }
 
-    /// Whether indirect light is asked for and there is some.
-    pub fn has_indirect_light(&self) -> bool {
-        self.buffers.rsm.as_ref().is_some_and(|rsm| rsm.sample_count() > 0)
-    }
-
     /// Checks that one binding holds a buffer.
     ///
     /// # Errors
@@ -228,15 +165,8 @@ impl Frame<'_> {
         pass.read_buffer("Positions", &b.positions);
         pass.read_buffer("Attributes", &b.attributes);
         pass.read_buffer("Indices", &b.indices);
-        if let Some(rsm) = &b.rsm {
-            // Without indirect light its code is gone, its slots are not: images of the same kinds fill them.
-            pass.read_buffer("RsmBlock", &rsm.constants);
-            pass.read_image("rsm_surface", rsm.images.as_ref().map_or(&b.materials, |i| &i.surface));
-            pass.read_image("rsm_flux", rsm.images.as_ref().map_or(&b.light_spheres, |i| &i.flux));
-        }
-        if let Some(shadow) = &b.shadow {
-            pass.read_buffer("ShadowBlock", &shadow.constants);
-            pass.read_image("shadow_map", shadow.map.as_ref().unwrap_or(&b.light_spheres));
+        for input in self.board.inputs() {
+            input.bind(self, pass);
         }
         pass.textures(&self.scene.texture_set);
     }
@@ -249,10 +179,9 @@ impl Frame<'_> {
             .copied()
             .chain([
                 ("ONLY_POINT_LIGHTS", u32::from(self.lights.only_points)),
-                ("SHADOWS", u32::from(self.buffers.shadow.as_ref().is_some_and(|s| s.map.is_some()))),
-                ("LIGHT_PAIRS", view::light_pairs_constant(self.view)),
-                ("INDIRECT_SAMPLES", self.buffers.rsm.as_ref().map_or(0, Rsm::sample_count)),
+                ("LIGHT_PAIRS", views::light_pairs_constant(self.view)),
             ])
+            .chain(self.board.inputs().iter().flat_map(|input| input.constants()))
             .filter(|(name, _)| shaders.iter().any(|s| s.reflection.spec_constant(name).is_some()))
             .map(|(name, bits)| (name.to_owned(), bits))
             .collect()

@@ -4,7 +4,10 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::{error::TechniqueError, light_step};
+use crate::TechniqueError;
+
+
+
 
 /// What values a parameter takes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -129,8 +132,8 @@ impl Params {
 
     /// All parameters that a technique has: those of all, its own, and where it has `lights` those of what lights may be listed for.
     pub fn known(info: &crate::Info) -> impl Iterator<Item = &'static ParamInfo> {
-        let has_step = info.params.iter().any(|p| p.key == light_step::KEY);
-        COMMON.iter().chain(info.params).chain(if has_step { light_step::CELLS } else { &[] })
+        let has_step = info.params.iter().any(|p| p.key == "lights");
+        COMMON.iter().chain(info.params).chain(if has_step { CELLS } else { &[] })
     }
 
     /// Every parameter of a technique with its value.
@@ -158,3 +161,44 @@ impl Params {
         Self::known(info).find(|p| p.key == key).map_or("", |p| self.get(p))
     }
 }
+
+/// Most slices: words of bits that `cells.comp.glsl` has for a tile.
+const SLICES_MAX: i64 = 256;
+
+/// Parameters of techniques with clusters.
+pub const CLUSTERS: &[ParamInfo] = &[CLUSTER_PX, SLICES, SLICING];
+
+/// Width of clusters.
+pub const CLUSTER_PX: ParamInfo = ParamInfo {
+    key: "cluster-px",
+    summary: "width and height of a cluster, pixels",
+    kind: ParamKind::Integer { min: 8, max: 256 },
+    default: "16",
+};
+
+/// Slices of view distance.
+pub const SLICES: ParamInfo = ParamInfo {
+    key: "slices",
+    summary: "clusters of a tile, one behind the other, between the ends of the scene",
+    kind: ParamKind::Integer { min: 1, max: SLICES_MAX as _ },
+    default: "128",
+};
+
+/// Where slices end.
+pub const SLICING: ParamInfo = ParamInfo {
+    key: "slicing",
+    summary: "view distances at which clusters end: in equal steps, or at equal ratios",
+    kind: ParamKind::Choice { values: &["logarithmic", "uniform"] },
+    default: "logarithmic",
+};
+
+/// Width of tiles.
+pub const TILE_PX: ParamInfo = ParamInfo {
+    key: "tile-px",
+    summary: "width and height of a tile, pixels",
+    kind: ParamKind::Integer { min: 8, max: 256 },
+    default: "16",
+};
+
+/// Parameters that every technique with `lights` has as well.
+pub const CELLS: &[ParamInfo] = &[TILE_PX, CLUSTER_PX, SLICES, SLICING];

@@ -1,14 +1,11 @@
 //! What a technique is.
 
 use afterlight_graph::{Graph, ImageHandle, gpu};
+use afterlight_shader::Shader;
 use serde::Serialize;
 
-use crate::{
-    cost::{Cost, Workload},
-    error::TechniqueError,
-    frame::Frame,
-    params::{ParamInfo, Params},
-};
+use afterlight_cost::{Cost, Workload};
+use crate::{Frame, TechniqueError, params::{ParamInfo, Params}};
 
 /// Where a technique comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -102,7 +99,7 @@ pub struct Info {
     pub samples: &'static [u32],
     /// Whether it draws tessellated surfaces: everything that finds triangles again by the index buffer does not.
     pub tessellation: bool,
-    /// Debug views of its own, by name; all that it has: [`crate::view::of`].
+    /// Debug views of its own, by name; all that it has: [`crate::views::of`].
     pub views: &'static [&'static str],
 }
 
@@ -116,6 +113,9 @@ pub trait Technique: Send + Sync {
     /// Facts about it.
     fn info(&self) -> &Info;
 
+    /// Compiled variants of its own shaders, by which [`Frame::shader`] finds them.
+    fn shaders(&self) -> &[Shader];
+
     /// Predicts its costs for a workload by the formulas of Petrescu et al. 2016, section 4. Pure arithmetic.
     fn predict(&self, workload: &Workload, params: &Params) -> Cost;
 
@@ -126,7 +126,7 @@ pub trait Technique: Send + Sync {
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError>;
 
     /// Whether its image is a sum over surfaces and lights of `light_radiance` and `unlit_radiance`, by weights, so that pairs of both can
-    /// be counted in the place of radiance ([`crate::view::LightPairs`]); false where radiance is made into something else.
+    /// be counted in the place of radiance ([`crate::views::LightPairs`]); false where radiance is made into something else.
     fn counts_light_pairs(&self) -> bool {
         true
     }

@@ -1,31 +1,34 @@
 //! From a scene and a technique to an image.
 
-use std::{cell::RefCell, sync::Arc};
+use std::sync::Arc;
 
 use afterlight_graph::{
     Executor, FrameReport, Graph, ImageHandle, ResourceId,
     gpu::{self, vk},
 };
-use afterlight_scene::{Aabb, Camera, Environment, Light, Projection, Scene};
-use afterlight_shader::{Shader, structs::FrameConstants};
-use glam::{Mat4, Vec3, Vec4};
+use afterlight_scene::Scene;
+use afterlight_shader::Shader;
 
-use crate::{
+use afterlight_frame::{
+    Board, CameraView, Frame, LightPairs, MAX_DISPLACEMENT_M, MIN_TESSELLATE_PX, Params, SceneBuffers,
+    SceneLights, Settings, Technique, TechniqueError,
+    camera_view::background_radiance,
     capacity::{self, Capacities, Counter, Demand},
-    draw_list::{DrawList, DrawOptions, DrawOrder},
-    error::TechniqueError,
-    frame::{Frame, FrameBuffers},
-    geometry::{MAX_DISPLACEMENT_M, MIN_TESSELLATE_PX},
-    indirect::{self, Indirect},
-    lights::LightList,
-    params::Params,
-    post::{self, Post},
-    scene_gpu::{SceneGpu, upload_slice},
-    shadow::{self, Shadows},
-    technique::Technique,
-    transparent::{self, BlendedList, Transparency},
-    view::{self, LightPairs},
-    volumes,
+    scene::{
+        SceneGpu,
+        draw_list::{DrawList, DrawOptions, DrawOrder},
+    },
+    upload::upload_slice,
+    views,
+};
+use afterlight_stages::{
+    compose::{
+        post,
+        transparent::{self, BlendedList},
+    },
+    lights::volumes,
+    shared::{indirect, shadow},
+    light_pair_colors,
 };
 
 /// Times that a view is recorded at most until everything that can overflow has room.
@@ -34,77 +37,11 @@ const RECORDINGS_MAX: u32 = 8;
 /// Layout in which uploads leave images.
 const UPLOADED: vk::ImageLayout = vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL;
 
-/// What a frame looks like, whatever the technique.
-#[derive(Clone, Debug)]
-pub struct Settings {
-    /// Image width, pixels, at least 1.
-    pub width_px: u32,
-    /// Image height, pixels, at least 1.
-    pub height_px: u32,
-    /// Visibility samples a pixel.
-    pub samples: u32,
-    /// Camera.
-    pub camera: Camera,
-    /// Lights.
-    pub lights: Vec<Light>,
-    /// What surrounds the scene.
-    pub environment: Environment,
-    /// What to show: [`view::FINAL`] or a debug view of the technique.
-    pub view: String,
-    /// Keeps the linear radiance after a frame, for [`Prepared::hdr_rgba`]; its memory is then not reused.
-    pub keep_hdr: bool,
-    /// Anti-aliasing after shading.
-    pub post: Post,
-    /// Tessellates surfaces to edges of that length on screen, pixels.
-    pub tessellate_px: Option<f32>,
-    /// How far tessellated surfaces are displaced along each axis at most, m; nothing without tessellation.
-    pub displacement_m: f32,
-    /// Light that surfaces reflect onto each other.
-    pub indirect: Indirect,
-    /// Width and height of the reflective shadow map, texels, at least 1.
-    pub rsm_size_px: u32,
-    /// Shadows of one light.
-    pub shadows: Shadows,
-    /// Width and height of the shadow map, texels, at least 1.
-    pub shadow_map_size_px: u32,
-    /// Scale of the shadow map's bias: 1 is what its filter needs, less makes surfaces shadow themselves, more takes shadows
-    /// off what casts them.
-    pub shadow_bias: f32,
-    /// How surfaces with alpha blending are drawn.
-    pub transparency: Transparency,
-}
-
-impl Settings {
-    /// One sample, the scene's first camera, its own lights.
-    pub fn for_scene(scene: &Scene, width_px: u32, height_px: u32) -> Self {
-        let camera = scene.cameras.first().cloned();
-        Self {
-            width_px,
-            height_px,
-            samples: 1,
-            camera: camera.unwrap_or_else(|| Camera::look_at("default", Vec3::Z, Vec3::ZERO, 1.0, 0.1)),
-            lights: scene.lights.clone(),
-            environment: scene.environment,
-            view: view::FINAL.to_owned(),
-            keep_hdr: false,
-            post: Post::None,
-            tessellate_px: None,
-            displacement_m: 0.0,
-            indirect: Indirect::None,
-            rsm_size_px: indirect::DEFAULT_MAP_SIZE_PX,
-            shadows: Shadows::None,
-            shadow_map_size_px: shadow::DEFAULT_MAP_SIZE_PX,
-            shadow_bias: 1.0,
-            transparency: Transparency::default(),
-        }
-    }
-}
-
 /// A scene on a device with a view of it: prepares techniques to run.
 pub struct Renderer {
     device: gpu::Device,
     scene: Arc<SceneGpu>,
-    lights: Arc<LightList>,
+    lights: Arc<SceneLights>,
     settings: Settings,
     volume: gpu::Buffer,
     volume_indices: gpu::Buffer,
@@ -131,7 +68,7 @@ impl Renderer {
     ) -> Result<Self, TechniqueError> {
         check_size(device, settings)?;
         let mut uploader = device.uploader()?;
-        let lights = Arc::new(LightList::new(device, &mut uploader, &settings.lights)?);
+        let lights = Arc::new(SceneLights::new(device, &mut uploader, &settings.lights)?);
         let (vertices, indices) = volumes::icosphere();
         let volume = upload_slice(device, &mut uploader, "light volume vertices", &vertices)?;
         let volume_indices = upload_slice(device, &mut uploader, "light volume indices", &indices)?;
@@ -163,7 +100,7 @@ impl Renderer {
     }
 
     /// The lights on the device.
-    pub fn lights(&self) -> &LightList {
+    pub fn lights(&self) -> &SceneLights {
         &self.lights
     }
 
@@ -174,7 +111,7 @@ impl Renderer {
 
     /// Nearest and farthest view distance, m, that a surface of the scene can have in this view: what clusters lie between.
     pub fn distance_range_m(&self) -> [f32; 2] {
-        View::new(&self.settings).constants(&self.settings, &self.lights, &self.scene).distance_range_m
+        CameraView::new(&self.settings).constants(&self.settings, &self.lights, &self.scene).distance_range_m
     }
 
     /// What of the settings this scene cannot give, a line each.
@@ -215,7 +152,7 @@ impl Renderer {
             },
         };
         let settings = &self.settings;
-        let view = View::new(settings);
+        let view = CameraView::new(settings);
         let mut draws = DrawList::new(&self.device, &self.scene, options)?;
         draws.update(&self.scene, view.clip_from_world, view.eye_ws, settings.displacement_m)?;
         let blended = BlendedList::of_view(&self.device, &self.scene, settings, &view, options.cull)?;
@@ -269,7 +206,7 @@ impl Renderer {
             });
         }
         let view = &self.settings.view;
-        let known = [&[view::FINAL], &view::of(technique)[..]].concat();
+        let known = [&[views::FINAL], &views::of(technique)[..]].concat();
         if !known.contains(&view.as_str()) {
             return Err(TechniqueError::UnknownView {
                 technique: info.id,
@@ -317,7 +254,7 @@ impl Renderer {
         &self,
         technique: &dyn Technique,
         params: &Params,
-        view: &View,
+        view: &CameraView,
         (draws, blended): (&DrawList, Option<&BlendedList>),
         constants: &gpu::Buffer,
         capacities: &Capacities,
@@ -338,23 +275,23 @@ impl Renderer {
             tessellate_px: settings.tessellate_px,
             displacement_m: settings.displacement_m,
             buffers: self.import(&mut graph, constants, draws),
-            extra_shaders: &self.extra_shaders,
+            shaders: &[&self.extra_shaders, technique.shaders(), &afterlight_stages::SHADERS],
             device: &self.device,
             capacities,
             visible: &draws.visible,
-            opaque_depth: RefCell::default(),
+            board: Board::default(),
         };
         indirect::record(&mut graph, &mut frame, settings)?;
         shadow::record(&mut graph, &mut frame, settings)?;
         let mut hdr = technique.record(&mut graph, &frame)?;
         if let Some(blended) = blended {
-            hdr = transparent::draw(&mut graph, &frame, blended, technique.info().id, hdr)?;
+            hdr = transparent::draw(&mut graph, &frame, blended, hdr)?;
         }
         also(&mut graph, &hdr);
-        let counts_pairs = view::counts_light_pairs(&settings.view);
+        let counts_pairs = views::counts_light_pairs(&settings.view);
         let hdr_id = (settings.keep_hdr || counts_pairs).then(|| graph.keep(&hdr));
         let shown = match counts_pairs {
-            true => view::light_pair_colors(&mut graph, &frame, &hdr)?,
+            true => light_pair_colors(&mut graph, &frame, &hdr)?,
             false => hdr,
         };
         let final_color = post::finish(&self.device, &mut graph, &frame, &shown, settings.post)?;
@@ -375,9 +312,9 @@ impl Renderer {
         })
     }
 
-    fn import(&self, graph: &mut Graph, constants: &gpu::Buffer, draws: &DrawList) -> FrameBuffers {
+    fn import(&self, graph: &mut Graph, constants: &gpu::Buffer, draws: &DrawList) -> SceneBuffers {
         let s = &self.scene;
-        FrameBuffers {
+        SceneBuffers {
             frame: graph.import_buffer("frame constants", constants),
             draws: graph.import_buffer("scene draws", &s.draws),
             draw_data: graph.import_image("scene draw records", &s.draw_data, UPLOADED),
@@ -392,8 +329,6 @@ impl Renderer {
             command_counts: graph.import_buffer("draw counts", &draws.counts),
             volume: graph.import_buffer("light volume vertices", &self.volume),
             volume_indices: graph.import_buffer("light volume indices", &self.volume_indices),
-            rsm: None,
-            shadow: None,
         }
     }
 }
@@ -446,13 +381,13 @@ impl Prepared {
     }
 
     /// The last frame's linear radiance, RGBA, rows from the top; `None` unless [`Settings::keep_hdr`] was set. In views of
-    /// [`view::LIGHT_PAIRS`] red is the pairs that a pixel tested, green those that are lit.
+    /// [`views::LIGHT_PAIRS`] red is the pairs that a pixel tested, green those that are lit.
     ///
     /// # Errors
     /// The device.
     pub fn hdr_rgba(&mut self) -> Result<Option<Vec<f32>>, TechniqueError> {
         let Some(bytes) = self.hdr_bytes()? else { return Ok(None) };
-        let scale = if self.light_pairs.is_some() { (1.0 / view::LIGHT_PAIR) as f32 } else { 1.0 };
+        let scale = if self.light_pairs.is_some() { (1.0 / views::LIGHT_PAIR) as f32 } else { 1.0 };
         let value = |half: &[u8]| half::f16::from_le_bytes([half[0], half[1]]).to_f32();
         let of_pixel = |p: &[u8]| {
             [scale * value(&p[..2]), scale * value(&p[2..4]), scale * value(&p[4..6]), value(&p[6..8])]
@@ -461,7 +396,7 @@ impl Prepared {
     }
 
     /// Pairs of a light and a surface that the last frame tested and lit; `None` unless [`Settings::view`] is one of
-    /// [`view::LIGHT_PAIRS`].
+    /// [`views::LIGHT_PAIRS`].
     ///
     /// # Errors
     /// The device.
@@ -471,7 +406,7 @@ impl Prepared {
     }
 
     /// The last frame's linear radiance as it lies on the device, RGBA16F.
-    pub(crate) fn hdr_bytes(&mut self) -> Result<Option<Vec<u8>>, TechniqueError> {
+    pub fn hdr_bytes(&mut self) -> Result<Option<Vec<u8>>, TechniqueError> {
         Ok(self.hdr.map(|hdr| self.executor.read_image(hdr)).transpose()?)
     }
 
@@ -494,84 +429,3 @@ impl Prepared {
     }
 }
 
-/// A camera's matrices for an image size.
-pub(crate) struct View {
-    pub clip_from_world: Mat4,
-    view_from_world: Mat4,
-    pub eye_ws: Vec3,
-}
-
-impl View {
-    pub fn new(settings: &Settings) -> Self {
-        let aspect = settings.width_px as f32 / settings.height_px as f32;
-        let view_from_world = settings.camera.view_from_world();
-        Self {
-            clip_from_world: settings.camera.clip_from_view(aspect) * view_from_world,
-            view_from_world,
-            eye_ws: settings.camera.eye_ws(),
-        }
-    }
-
-    /// What the view distance of a point p, m, is: dot(xyz, p) + w. The view looks along -z.
-    pub fn distance_from_world(&self) -> Vec4 {
-        -self.view_from_world.row(2)
-    }
-
-    pub fn constants(&self, settings: &Settings, lights: &LightList, scene: &SceneGpu) -> FrameConstants {
-        let distance_from_world = self.distance_from_world();
-        let near_m = match settings.camera.projection {
-            Projection::Perspective { near_m, .. } | Projection::Orthographic { near_m, .. } => near_m,
-        };
-        let bounds_ws = scene.bounds_ws(settings.displacement_m);
-        let to_eye = self.view_from_world.row(2).truncate();
-        let (depth_to_distance, eye) = match settings.camera.projection {
-            Projection::Perspective { near_m, .. } => {
-                (Vec4::new(0.0, near_m, 1.0, 0.0), self.eye_ws.extend(1.0))
-            }
-            Projection::Orthographic { near_m, far_m, .. } => {
-                (Vec4::new(near_m - far_m, far_m, 0.0, 1.0), to_eye.extend(0.0))
-            }
-        };
-        FrameConstants {
-            clip_from_world: self.clip_from_world.to_cols_array_2d(),
-            world_from_clip: inverse(self.clip_from_world),
-            depth_to_distance: depth_to_distance.into(),
-            distance_from_world: distance_from_world.into(),
-            eye_ws: eye.into(),
-            size_px: [settings.width_px, settings.height_px],
-            tile_count: [settings.width_px.div_ceil(16), settings.height_px.div_ceil(16)],
-            ambient_radiance: settings.environment.ambient_radiance.into(),
-            light_count: lights.count,
-            background_radiance: background_radiance(settings).into(),
-            unbounded_light_count: lights.unbounded_count,
-            distance_range_m: distance_range_m(&bounds_ws, distance_from_world, near_m),
-        }
-    }
-}
-
-/// Nearest and farthest view distance, m, of what lies in a box and behind the near plane, with room for rounding. The nearest is
-/// at least this share of the farthest: slices at equal ratios would else be spent on what nobody sees.
-fn distance_range_m(bounds_ws: &Aabb, distance_from_world: Vec4, near_m: f32) -> [f32; 2] {
-    const LEAST_SHARE: f32 = 1e-4;
-    if bounds_ws.is_empty() {
-        return [1.0, 2.0];
-    }
-    let center_m = distance_from_world.dot(bounds_ws.center().extend(1.0));
-    let half_m = 0.5 * distance_from_world.truncate().abs().dot(bounds_ws.size());
-    let farthest_m = (1.001 * (center_m + half_m)).max(f32::MIN_POSITIVE * 1e8);
-    let nearest_m = (0.999 * (center_m - half_m)).max(0.999 * near_m).max(LEAST_SHARE * farthest_m);
-    [nearest_m, farthest_m.max(2.0 * nearest_m)]
-}
-
-/// Radiance of pixels without a surface: none where it would be taken for pairs of lights.
-fn background_radiance(settings: &Settings) -> Vec3 {
-    match view::replaces_light(&settings.view) {
-        true => Vec3::ZERO,
-        false => settings.environment.background_radiance,
-    }
-}
-
-/// Inverse, computed in 64 bits: positions are reconstructed through it.
-fn inverse(m: Mat4) -> [[f32; 4]; 4] {
-    m.as_dmat4().inverse().as_mat4().to_cols_array_2d()
-}

@@ -5,16 +5,9 @@ use std::sync::Arc;
 use afterlight_graph::gpu;
 use half::f16;
 
-use crate::{
-    error::TechniqueError,
-    params::Params,
-    post::Post,
-    present,
-    renderer::{Renderer, Settings},
-    scene_gpu::SceneGpu,
-    technique::Technique,
-    view,
-};
+use afterlight_frame::{Post, Settings, Technique, TechniqueError, params::Params, scene::SceneGpu, views};
+use afterlight_stages::compose::present;
+use crate::Renderer;
 
 /// Renders a technique at `factor` times the settings' width and height, one sample a pixel, averages the linear radiance
 /// of `factor`×`factor` pixels, and tone-maps the mean: RGBA with 8 bits a channel, sRGB-encoded, rows from the top.
@@ -39,7 +32,7 @@ pub fn reference_rgba8(
         samples: 1,
         keep_hdr: true,
         post: Post::None,
-        view: view::FINAL.to_owned(),
+        view: views::FINAL.to_owned(),
         // The same triangles: edges of the large image are as much longer.
         tessellate_px: settings.tessellate_px.map(|px| px * factor as f32),
         ..settings.clone()

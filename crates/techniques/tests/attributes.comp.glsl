@@ -3,7 +3,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #define EXPLICIT_GRADIENTS
-#include "triangle_buffer/interpolate.glsl"
+#include "surfaces/triangles/interpolate.glsl"
 
 layout(local_size_x = 128) in;
 layout(set = 0, binding = 8, scalar) readonly buffer Pixels {

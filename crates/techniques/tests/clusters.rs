@@ -340,7 +340,7 @@ fn tests_that_are_too_tight_are_caught() {
     let stage = Stage::new(&gpu, "builtin:colonnade?triangles=20000");
     let mut settings = stage.settings((160, 90), 0);
     settings.lights = lights_of_all_kinds(&stage, 1, 300);
-    let bounds = "clusters/bounds.glsl";
+    let bounds = "lights/cells/bounds.glsl";
     let (clusters, tiles25) = (DIVISIONS[0], DIVISIONS[5]);
     let mutants = [
         (clusters, bounds, "float range_m = sphere.w;", "float range_m = 0.95 * sphere.w;"),
@@ -348,11 +348,11 @@ fn tests_that_are_too_tight_are_caught() {
         (clusters, bounds, "min(first + LIGHT_TILE_PX, frame.size_px)", "first + LIGHT_TILE_PX / 2u"),
         (clusters, bounds, "outside_m <= b.sphere.w", "outside_m <= -0.7 * b.sphere.w"),
         (clusters, bounds, "lessThanEqual(box.low, b.high_ws)", "lessThanEqual(box.low, b.low_ws)"),
-        (clusters, "light_bvh/tree.glsl", "+ (1u << shift) - 1u) >> shift", ") >> shift"),
+        (clusters, "lights/bvh/tree.glsl", "+ (1u << shift) - 1u) >> shift", ") >> shift"),
         (tiles25, bounds, "(0xffffffffu >> (31u - last))", "(0x7fffffffu >> (31u - last))"),
     ];
     for (division, header, from, to) in mutants {
-        let shader = mutant("clusters/assign.comp", header, from, to);
+        let shader = mutant("lights/cells/assign.comp", header, from, to);
         let found = found(&stage, &settings, division, &[shader]);
         let [_, reached, missed] = found.pairs(&settings.lights);
         println!("{to}: {missed} of {reached} pairs missed");
@@ -372,7 +372,7 @@ fn the_next_cluster_is_caught() {
     let stage = Stage::new(&gpu, "builtin:colonnade?triangles=20000");
     let settings = stage.settings((160, 90), 100);
     let reference = stage.image(find("forward").unwrap(), &settings);
-    let wrong = mutant("gbuffer/shade.comp", "clusters/lists.glsl", "word.x & (bit - 1u)", "word.x & bit");
+    let wrong = mutant("surfaces/gbuffer/shade.comp", "lights/cells/cell_lists.glsl", "word.x & (bit - 1u)", "word.x & bit");
     let db = psnr(&reference, &image_with(&stage, "clustered", &settings, &[wrong]));
     println!("the next cluster: {db:.2} dB");
     assert!(db < 45.0, "a mutant within the bound: {db:.2} dB");

@@ -28,7 +28,7 @@ fn rendered(stage: &Stage, id: &str, settings: &Settings, shader: Option<Shader>
 
 /// A shader that visits the lights, with parts of `light_indices/indices.glsl` replaced.
 fn visits(shader: &str, replaced: &[(&str, &str)]) -> Shader {
-    compiled_with_header(shader, (&sources(), "light_indices/indices.glsl"), replaced)
+    compiled_with_header(shader, (&sources(), "lights/indices/indices.glsl"), replaced)
 }
 
 /// Places that the pixels show.

@@ -32,8 +32,8 @@ fn rendered(
 
 /// `append.frag` with a part of its text replaced.
 fn mutant(from: &str, to: &str) -> Shader {
-    let path = sources().join("light_lists/append.frag.glsl");
-    compiled("light_lists/append.frag#one", &path, &["ONE_DEPTH"], &[(from, to)])
+    let path = sources().join("lights/pixel_lists/append.frag.glsl");
+    compiled("lights/pixel_lists/append.frag#one", &path, &["ONE_DEPTH"], &[(from, to)])
 }
 
 /// Both techniques against `forward`; nothing is dropped.

@@ -90,7 +90,7 @@ fn wrong_lists_are_seen() {
     let settings = settings(&stage, 1);
     let technique = find("deferred").unwrap();
     let mutant = |header, from, to| -> Shader {
-        compiled_with_header("gbuffer/shade.comp", (&sources(), header), &[(from, to)])
+        compiled_with_header("surfaces/gbuffer/shade.comp", (&sources(), header), &[(from, to)])
     };
     let image = |lights, shaders: Vec<Shader>| {
         let params = params(technique, &[("lights", lights)]);
@@ -98,15 +98,15 @@ fn wrong_lists_are_seen() {
     };
     let reference = image("all", Vec::new());
     for (lights, header, from, to) in [
-        ("clusters", "clusters/lists.glsl", "cell_lists[i]", "cell_lists[list.x]"),
-        ("tiles", "clusters/lists.glsl", "i < list.y;", "i + 1u < list.y;"),
+        ("clusters", "lights/cells/cell_lists.glsl", "cell_lists[i]", "cell_lists[list.x]"),
+        ("tiles", "lights/cells/cell_lists.glsl", "i < list.y;", "i + 1u < list.y;"),
         (
             "tree",
-            "light_bvh/boxes.glsl",
+            "lights/bvh/boxes.glsl",
             "lessThanEqual(point_ws, box.high)",
             "lessThanEqual(point_ws, 0.5 * (box.low + box.high))",
         ),
-        ("lists", "light_lists/lists.glsl", "link = node.y;", "link = 0u;"),
+        ("lists", "lights/pixel_lists/pixel_lists.glsl", "link = node.y;", "link = 0u;"),
     ] {
         let db = psnr(&reference, &image(lights, vec![mutant(header, from, to)]));
         println!("{lights}, {to}: {db:.2} dB");

@@ -104,7 +104,7 @@ fn shares(probes: &[Probe], with: &[[f32; 4]], plain: &[[f32; 4]], none: &[[f32;
 /// `forward/forward.frag` with a part of `shadow.glsl` replaced.
 fn mutant(from: &str, to: &str) -> Shader {
     let include = sources().join("../../shader/include");
-    compiled_with_header("forward/forward.frag", (&include, "shadow.glsl"), &[(from, to)])
+    compiled_with_header("surfaces/depth_first/forward.frag", (&include, "shadow.glsl"), &[(from, to)])
 }
 
 fn radiance(stage: &Stage, settings: &Settings, shader: Option<&Shader>) -> Vec<[f32; 4]> {

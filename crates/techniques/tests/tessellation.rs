@@ -272,14 +272,14 @@ fn cracks_are_caught() {
         return;
     }
     let along_normals = mutant(
-        "geometry/surface.tese.glsl",
+        "surfaces/geometry/surface.tese.glsl",
         "",
         &[],
         "world = displaced(world, DISPLACEMENT_M, columns);",
         "world -= DISPLACEMENT_M * normalize(AT_POINT(patch_normal_ws));",
     );
     let by_triangle = mutant(
-        "geometry/surface.tesc.glsl",
+        "surfaces/geometry/surface.tesc.glsl",
         "",
         &[],
         "gl_TessLevelOuter[0] = edges.x;",
@@ -459,10 +459,10 @@ fn wrongly_stored_triangles_are_caught() {
     if !can(&gpu) {
         return;
     }
-    let whole = |from, to| mutant("geometry/number.geom.glsl", "#whole", &["WHOLE_TRIANGLE"], from, to);
+    let whole = |from, to| mutant("surfaces/geometry/number.geom.glsl", "#whole", &["WHOLE_TRIANGLE"], from, to);
     let read = |from, to| {
         let defines = ["LISTED", "WHOLE_TRIANGLE"];
-        mutant("triangle_buffer/derivatives.comp.glsl", "#vertices", &defines, from, to)
+        mutant("surfaces/triangles/derivatives.comp.glsl", "#vertices", &defines, from, to)
     };
     let mutants = [
         ("colonnade", "order", whole("= in_position_ws[k]", "= in_position_ws[(k + 1) % 3]")),

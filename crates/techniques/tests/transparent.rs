@@ -196,7 +196,7 @@ impl Technique for Flat {
             // Nearer than everything.
             let depth = pass.depth(depth, Load::Clear(1.0));
             pass.finish();
-            frame.hand_over_depth(depth);
+            frame.board.put(OpaqueDepth(depth));
         }
         let image = graph.image("flat/radiance", frame.image_info(vk::Format::R16G16B16A16_SFLOAT));
         let [r, g, b] = self.radiance;
@@ -277,8 +277,8 @@ const CALL: &str = "stepped_radiance(s, uvec2(gl_FragCoord.xy))";
 
 /// `transparent/blend.frag` with a part of its text replaced.
 fn mutant(from: &str, to: &str) -> Shader {
-    let path = sources().join("transparent/blend.frag.glsl");
-    compiled("transparent/blend.frag", &path, &[], &[(from, to)])
+    let path = sources().join("compose/transparent/blend.frag.glsl");
+    compiled("compose/transparent/blend.frag", &path, &[], &[(from, to)])
 }
 
 /// Radiance of `forward` with shaders in the place of its own.

@@ -277,7 +277,7 @@ impl<'a> Stage<'a> {
         let tests = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests");
         let mut renderer = Renderer::with_scene(self.device, self.uploaded.clone(), &self.settings)
             .unwrap_or_else(|e| panic!("{e}"));
-        let name = "triangle_buffer/derivatives.comp";
+        let name = "surfaces/triangles/derivatives.comp";
         renderer.add_shaders([
             compiled("test/attributes.comp", &tests.join("attributes.comp.glsl"), &[], &[]),
             compiled(name, &sources().join(format!("{name}.glsl")), &[], mutant),

@@ -207,8 +207,8 @@ fn wrong_records_are_seen() {
         ("by * (inverse_det * pixel_ndc.y)", "by * (inverse_det * -pixel_ndc.y)"),
         ("vec2 ndc = (anchor + 0.5)", "vec2 ndc = (anchor + 1.5)"),
     ] {
-        let path = sources().join("triangle_buffer/derivatives.comp.glsl");
-        let name = "triangle_buffer/derivatives.comp#ids";
+        let path = sources().join("surfaces/triangles/derivatives.comp.glsl");
+        let name = "surfaces/triangles/derivatives.comp#ids";
         let mutant = compiled(name, &path, &["RECORD_IDS"], &[replaced]);
         let mut prepared = prepared(&stage, &settings, &way, Some(mutant));
         let found = compared(&words(&mut prepared, way.0, view::ATTRIBUTE_ERRORS));

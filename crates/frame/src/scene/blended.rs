@@ -6,13 +6,10 @@ use afterlight_scene::{Aabb, Scene};
 use afterlight_shader::structs::DrawData;
 use glam::{Mat4, Vec3, Vec4};
 
-use crate::{
-    draw_list::{DrawCommand, Frustum, displaced},
-    scene_gpu::DrawInfo,
-};
+use crate::scene::{DrawInfo, draw_list::{DrawCommand, Frustum, displaced}};
 
 /// What the CPU keeps of a scene's draws with alpha blending.
-pub(crate) struct Blended {
+pub struct Blended {
     draws: Vec<BlendedDraw>,
     /// Centroids of all triangles, draw by draw, m.
     centroids_ws: Vec<Vec3>,
@@ -30,7 +27,7 @@ struct BlendedDraw {
 }
 
 /// How a view orders triangles.
-pub(crate) struct ViewOrder {
+pub struct ViewOrder {
     /// Leaves out draws outside of this view.
     pub cull: Option<Mat4>,
     /// The view distance of a point p is dot(xyz, p) + w, m.
@@ -43,7 +40,7 @@ pub(crate) struct ViewOrder {
 
 /// Triangles in drawing order.
 #[derive(Default)]
-pub(crate) struct Ordered {
+pub struct Ordered {
     /// Three a triangle, counted from the first vertex of its draw.
     pub indices: Vec<u32>,
     /// One a run of triangles of one draw.

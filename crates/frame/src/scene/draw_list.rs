@@ -4,7 +4,7 @@ use afterlight_graph::gpu::{self, vk};
 use afterlight_scene::Aabb;
 use glam::{Mat4, Vec3, Vec4};
 
-use crate::scene_gpu::{BUCKETS, DrawInfo, SceneGpu};
+use crate::scene::{BUCKETS, DrawInfo, SceneGpu};
 
 /// How draws are chosen and ordered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,7 +36,7 @@ impl Default for DrawOptions {
 /// `VkDrawIndexedIndirectCommand`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
-pub(crate) struct DrawCommand {
+pub struct DrawCommand {
     pub index_count: u32,
     pub instance_count: u32,
     pub first_index: u32,
@@ -46,10 +46,10 @@ pub(crate) struct DrawCommand {
 }
 
 /// Distance between commands in the buffer, bytes.
-pub(crate) const COMMAND_BYTES: u64 = size_of::<DrawCommand>() as u64;
+pub const COMMAND_BYTES: u64 = size_of::<DrawCommand>() as u64;
 
 /// Indirect commands of a view, one range of the buffer a bucket, and their counts.
-pub(crate) struct DrawList {
+pub struct DrawList {
     pub commands: gpu::Buffer,
     pub counts: gpu::Buffer,
     pub options: DrawOptions,
@@ -115,7 +115,7 @@ impl DrawList {
     }
 }
 
-pub(crate) fn command(info: &DrawInfo, draw: u32) -> DrawCommand {
+pub fn command(info: &DrawInfo, draw: u32) -> DrawCommand {
     DrawCommand {
         index_count: info.index_count,
         instance_count: 1,
@@ -126,7 +126,7 @@ pub(crate) fn command(info: &DrawInfo, draw: u32) -> DrawCommand {
 }
 
 /// What surfaces of those bounds reach where they are displaced by up to `displacement_m` along each axis.
-pub(crate) fn displaced(bounds: &Aabb, displacement_m: f32) -> Aabb {
+pub fn displaced(bounds: &Aabb, displacement_m: f32) -> Aabb {
     let margin = Vec3::splat(displacement_m);
     Aabb { min: bounds.min - margin, max: bounds.max + margin }
 }
@@ -148,7 +148,7 @@ fn distance_sq(bounds: &Aabb, point: Vec3) -> f32 {
 }
 
 /// Half-spaces of a view: inside where dot(xyz, p) + w ≥ 0.
-pub(crate) struct Frustum([Vec4; 6]);
+pub struct Frustum([Vec4; 6]);
 
 impl Frustum {
     /// Rows of clip_from_world combined (Gribb and Hartmann 2001); depth is reversed, so near is w − z and far z.

@@ -5,15 +5,15 @@ use afterlight_scene::{Aabb, Light, LightKind};
 use afterlight_shader::structs::LightData;
 use glam::Vec3;
 
-use crate::scene_gpu::record_image;
+use crate::scene::record_image;
 
 /// Lights on the device: those without an end first, so that techniques with light volumes can tell them apart, the others along
 /// a curve that keeps neighbours together (`light_bvh/`).
-pub struct LightList {
+pub struct SceneLights {
     /// Four texels a light.
-    pub(crate) data: gpu::Image,
+    pub data: gpu::Image,
     /// Centre and radius of the least sphere around what each light reaches, one texel, what culling reads.
-    pub(crate) spheres: gpu::Image,
+    pub spheres: gpu::Image,
     /// Number of lights.
     pub count: u32,
     /// Number of lights without an end, first in the list.
@@ -24,7 +24,7 @@ pub struct LightList {
     pub lights: Vec<Light>,
 }
 
-impl LightList {
+impl SceneLights {
     /// Uploads lights in [`device_order`].
     ///
     /// # Errors
@@ -60,7 +60,7 @@ impl LightList {
     }
 
     /// Number of a light in the order of the device, the first of equals; 0 where it is not there.
-    pub(crate) fn index_of(&self, light: &Light) -> u32 {
+    pub fn index_of(&self, light: &Light) -> u32 {
         self.lights.iter().position(|one| one == light).unwrap_or_default() as u32
     }
 }

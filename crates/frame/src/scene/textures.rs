@@ -13,13 +13,10 @@ use afterlight_scene::{
 };
 use rayon::prelude::*;
 
-use crate::{
-    error::TechniqueError,
-    scene_gpu::{Progress, image_name, slots},
-};
+use crate::{TechniqueError, scene::{Progress, materials::{image_name, slots}}};
 
 /// Use of a texture.
-pub(crate) type Role = TextureRole;
+pub type Role = TextureRole;
 
 /// Buckets that shaders have for each format class: `srgb_textures`, `normal_textures`, `data_textures` in
 /// `include/material.glsl`. 28 in all: lavapipe gives a stage 32 samplers.
@@ -69,14 +66,14 @@ fn role_of(index: u8) -> Role {
 }
 
 /// Where each texture of a scene lies.
-pub(crate) struct TextureTable {
+pub struct TextureTable {
     /// Textures of each class and bucket, by layer.
     buckets: [Vec<(BucketKey, Vec<Use>)>; 3],
     places: BTreeMap<Use, u32>,
 }
 
 /// The scene's textures on the device.
-pub(crate) struct UploadedTextures {
+pub struct UploadedTextures {
     pub set: gpu::DescriptorSet,
     pub bytes: u64,
 }

@@ -2,10 +2,10 @@
 
 use afterlight_graph::{Graph, ImageHandle, Load, RasterPass, gpu::vk};
 
-use crate::frame::Frame;
+use afterlight_frame::Frame;
 
 /// Radiance a sample and, at several samples, the image that they are averaged into.
-pub(crate) struct RadianceTarget {
+pub struct RadianceTarget {
     samples: ImageHandle,
     resolved: Option<ImageHandle>,
 }

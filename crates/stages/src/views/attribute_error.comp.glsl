@@ -7,7 +7,7 @@
 // compared. Dispatch: 8x8 groups.
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#include "view/records.glsl"
+#include "views/records.glsl"
 #include "heat.glsl"
 
 layout(set = 0, binding = 11) uniform utexture2D reference_position;

@@ -4,7 +4,7 @@
 #define AFTERLIGHT_VIEW_RECORDS
 #include "frame.glsl"
 #include "material.glsl"
-#include "multisample/sample_depth.glsl"
+#include "surfaces/visible/sample_depth.glsl"
 
 #if defined(SOURCE_DAIS)
 #include "dais/source_dais.glsl"

@@ -2,14 +2,10 @@
 
 use afterlight_graph::{ComputePass, Graph, ImageHandle, Load, gpu::vk};
 
-use super::TEXTURE_ERROR;
-use crate::{
-    error::TechniqueError,
-    frame::{Frame, SourceSlots},
-    geometry::Surfaces,
-    scene::Aabb,
-    triangle_buffer::Records,
-};
+use afterlight_frame::views::TEXTURE_ERROR;
+use afterlight_frame::{Frame, SourceSlots, TechniqueError};
+use crate::surfaces::{geometry::SceneDraws, triangles::Records};
+use afterlight_scene::Aabb;
 
 /// Name, after the technique's, of the buffer of errors that [`RecordSource::record`] keeps: two 32-bit floats a
 /// pixel, rows from the top. Distance of the positions in a scene whose longest side is 2; largest difference of a channel of
@@ -43,7 +39,7 @@ impl RecordSource<'_> {
     /// # Errors
     /// A view of errors in a tessellated frame, whose triangles have no ID; a shader that is not compiled in.
     pub fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
-        match super::compares_triangles(frame.view) {
+        match afterlight_frame::views::compares_triangles(frame.view) {
             true => self.attribute_error(graph, frame),
             false => self.sharing(graph, frame),
         }
@@ -111,7 +107,7 @@ impl RecordSource<'_> {
         let position = image(graph, "reference position", vk::Format::R32G32B32A32_UINT);
         let color = image(graph, "reference color", vk::Format::R32G32B32A32_SFLOAT);
         let depth = image(graph, "reference depth", vk::Format::D32_SFLOAT);
-        let surfaces = Surfaces::shaded(frame, "view/reference.frag", "view/reference.frag#mask")?;
+        let surfaces = SceneDraws::shaded(frame, "views/reference.frag", "views/reference.frag#mask")?;
         let mut pass = graph.raster(&self.name("reference"));
         frame.bind_scene(&mut pass);
         let position = pass.color_uint(position, Load::Clear(NO_TRIANGLE_UINT));

@@ -4,7 +4,7 @@
 // In: the source of records, RecordSamples. Out: hdr, RGBA16F, display-linear. Dispatch: 8x8 groups.
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#include "view/records.glsl"
+#include "views/records.glsl"
 #include "heat.glsl"
 
 layout(set = 0, binding = 15, scalar) readonly buffer RecordSamples {

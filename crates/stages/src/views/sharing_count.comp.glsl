@@ -4,7 +4,7 @@
 // In: the source of records. Out: RecordSamples, a word a record. Dispatch: 8x8 groups.
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#include "view/records.glsl"
+#include "views/records.glsl"
 
 layout(set = 0, binding = 15, scalar) buffer RecordSamples {
     uint record_samples[];

@@ -4,13 +4,10 @@
 
 use afterlight_graph::{Graph, ImageHandle, gpu::vk};
 
-use crate::{
-    Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError,
-    clusters::{self, Division, Grid, Surfaces},
-    cost::{Cost, Workload, clustered_deferred},
-    gbuffer,
-    light_step::LightStep,
-};
+use afterlight_shader::Shader;
+use afterlight_frame::{Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError};
+use afterlight_stages::{lights::{cells::{Division, Grid, Surfaces, self}, step::LightStep}, surfaces::gbuffer};
+use afterlight_cost::{Cost, Workload, clustered_deferred};
 
 /// The technique.
 pub static TECHNIQUE: Clustered = Clustered;
@@ -39,7 +36,7 @@ static INFO: Info = Info {
         rates_decoupled: "n, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
-    params: clusters::PARAMS,
+    params: cells::PARAMS,
     needs: &[],
     samples: &[1],
     tessellation: true,
@@ -55,6 +52,10 @@ impl Technique for Clustered {
         &INFO
     }
 
+    fn shaders(&self) -> &[Shader] {
+        &crate::SHADERS
+    }
+
     fn predict(&self, workload: &Workload, params: &Params) -> Cost {
         clustered_deferred(workload, division(params).most_pixels())
     }
@@ -62,7 +63,7 @@ impl Technique for Clustered {
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let filled = gbuffer::fill(graph, frame, INFO.id, vk::Format::D32_SFLOAT)?;
         let surfaces = Surfaces::of_depth(&filled.depth, 1);
-        let lists = clusters::build(graph, frame, INFO.id, division(frame.params), &surfaces)?;
+        let lists = cells::build(graph, frame, INFO.id, division(frame.params), &surfaces)?;
         drop(surfaces);
         gbuffer::shade(graph, frame, INFO.id, filled, &LightStep::Cells(lists))
     }

@@ -4,12 +4,10 @@
 
 use afterlight_graph::{Graph, ImageHandle};
 
-use crate::{
-    ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError,
-    clusters::{self, Division, Grid},
-    cost::{Cost, Workload, clustered_forward},
-    light_step::record_forward,
-};
+use afterlight_shader::Shader;
+use afterlight_frame::{ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError};
+use afterlight_stages::{lights::cells::{Division, Grid, self}, surfaces::depth_first::record_forward};
+use afterlight_cost::{Cost, Workload, clustered_forward};
 
 /// The technique.
 pub static TECHNIQUE: ClusteredForward = ClusteredForward;
@@ -38,7 +36,7 @@ static INFO: Info = Info {
         rates_decoupled: "n, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
-    params: clusters::PARAMS,
+    params: cells::PARAMS,
     needs: &[],
     samples: ANY_SAMPLES,
     tessellation: true,
@@ -52,6 +50,10 @@ fn division(params: &Params) -> Division {
 impl Technique for ClusteredForward {
     fn info(&self) -> &Info {
         &INFO
+    }
+
+    fn shaders(&self) -> &[Shader] {
+        &crate::SHADERS
     }
 
     fn predict(&self, workload: &Workload, params: &Params) -> Cost {

@@ -8,10 +8,10 @@
 // stored once more, which costs memory and nothing else.
 #ifndef AFTERLIGHT_MEMOIZE
 #define AFTERLIGHT_MEMOIZE
-#include "triangle_buffer/record.glsl"
+#include "surfaces/triangles/record.glsl"
 #ifdef WHOLE_TRIANGLE
 #define THROUGH in
-#include "geometry/whole_triangle.glsl"
+#include "surfaces/geometry/whole_triangle.glsl"
 #endif
 
 // Triangle ID and its place, two entries a bucket. Written place first, ID last; an ID that is being replaced is none. Volatile:

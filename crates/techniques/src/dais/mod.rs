@@ -8,17 +8,11 @@ pub(crate) use passes::{FillPass, depth_surfaces};
 
 use afterlight_graph::{BufferHandle, Graph, ImageHandle, Load, RasterPass, gpu::vk};
 
-use crate::{
-    ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, ParamInfo, ParamKind, Params, Source, Technique,
-    TechniqueError, clusters, compute_raster,
-    cost::{self, Cost, Workload},
-    dais_multirate::LowRate,
-    frame::SourceSlots,
-    light_step,
-    multisample::{self, NO_TRIANGLE_RGBA8, Visible},
-    triangle_buffer::{self, Records},
-    view,
-};
+use afterlight_shader::Shader;
+use afterlight_frame::{OpaqueDepth, ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, ParamInfo, ParamKind, Params, Source, SourceSlots, Technique, TechniqueError, views};
+use afterlight_stages::{lights::{cells, step}, surfaces::{compute_raster, shade::{NO_TRIANGLE_RGBA8, self}, triangles::{Records, self}, visible::Visible}};
+use afterlight_cost::{Cost, Workload, self};
+use crate::dais_multirate::LowRate;
 
 /// The technique.
 pub static TECHNIQUE: Dais = Dais;
@@ -77,7 +71,7 @@ impl Cache {
     }
 
     /// Specialization constants of `dais/memoize.glsl`.
-    pub fn constants(&self, list: &triangle_buffer::List) -> Vec<(String, u32)> {
+    pub fn constants(&self, list: &triangles::List) -> Vec<(String, u32)> {
         [("TRIANGLE_CAPACITY", list.capacity), ("CACHE_BUCKETS", self.buckets), ("POLLS", POLLS)]
             .map(|(name, value)| (name.to_owned(), value))
             .to_vec()
@@ -120,7 +114,7 @@ static INFO: Info = Info {
     // Texture gradients are analytic.
     exactness: Exactness::Exact { min_psnr_db: 45.0 },
     params: &[
-        light_step::LIGHTS,
+        step::LIGHTS,
         FILL,
         CACHE_BUCKETS,
         REFERENCE_BITS,
@@ -130,12 +124,16 @@ static INFO: Info = Info {
     needs: &[],
     samples: ANY_SAMPLES,
     tessellation: true,
-    views: view::TRIANGLES,
+    views: views::TRIANGLES,
 };
 
 impl Technique for Dais {
     fn info(&self) -> &Info {
         &INFO
+    }
+
+    fn shaders(&self) -> &[Shader] {
+        &crate::SHADERS
     }
 
     fn predict(&self, workload: &Workload, params: &Params) -> Cost {
@@ -164,7 +162,7 @@ pub(crate) fn record(
         return record_cached(graph, frame, info, rate);
     }
     let visible = Visible::find(graph, frame, info, frame.samples)?;
-    let triangles = triangle_buffer::fill(graph, frame, info.id, &visible)?;
+    let triangles = triangles::fill(graph, frame, info.id, &visible)?;
     let source = format!("dais{}", visible.tag('-'));
     let surfaces = visible.surfaces();
     let radiance = shade(graph, frame, info, rate, (&source, &surfaces), &triangles.records, &|pass| {
@@ -173,7 +171,7 @@ pub(crate) fn record(
     })?;
     drop(surfaces);
     if let Visible::Ids { depth, .. } = visible {
-        frame.hand_over_depth(depth);
+        frame.board.put(OpaqueDepth(depth));
     }
     Ok(radiance)
 }
@@ -185,17 +183,17 @@ pub(crate) fn shade(
     frame: &Frame<'_>,
     info: &'static Info,
     rate: Option<&LowRate>,
-    (source, surfaces): (&str, &clusters::Surfaces<'_>),
+    (source, surfaces): (&str, &cells::VisibleDepths<'_>),
     records: &Records,
     bind: &dyn Fn(&mut dyn SourceSlots),
 ) -> Result<ImageHandle, TechniqueError> {
-    if view::is_of_triangles(frame.view) {
+    if views::is_of_triangles(frame.view) {
         let samples = frame.samples;
-        return view::RecordSource { technique: info.id, tag: source, samples, records, bind }
+        return views::RecordSource { technique: info.id, tag: source, samples, records, bind }
             .record(graph, frame);
     }
     let source = format!("{source}{}", rate.map_or("", LowRate::tag));
-    multisample::shade(graph, frame, info, (&source, frame.samples), surfaces, &|pass| {
+    shade::shade(graph, frame, info, (&source, frame.samples), surfaces, &|pass| {
         if let Some(rate) = rate {
             rate.constants(pass);
         }
@@ -235,7 +233,7 @@ fn is_wide(frame: &Frame<'_>, info: &Info) -> bool {
     let bits = frame.params.number(info, REFERENCE_BITS.key) as u32;
     // All ones with full coverage is the background; what finds no place is the one before.
     let narrow_max = (1_u32 << bits).saturating_sub(2);
-    triangle_buffer::capacity(frame) > narrow_max
+    triangles::capacity(frame) > narrow_max
         || frame.samples > COVERAGE_SAMPLES_MAX
         || !frame.features().post_depth_coverage
 }
@@ -254,7 +252,7 @@ fn record_cached(
     let references = graph.image(&references, frame.multisampled_info(vk::Format::R8G8B8A8_UNORM));
     let depth = graph.image(&name("depth"), frame.multisampled_info(vk::Format::D32_SFLOAT));
     let cache = Cache::new(graph, frame, info);
-    let list = triangle_buffer::List::new(graph, frame, info.id, REFERENCES_MAX)?;
+    let list = triangles::List::new(graph, frame, info.id, REFERENCES_MAX)?;
     let tags = if wide { &["wide"][..] } else { &[] };
     let depth_only = depth_surfaces(frame)?;
     let mut fill = FillPass::new(graph, frame, info, "dais/fill.frag", tags)?;

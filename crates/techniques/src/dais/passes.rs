@@ -2,15 +2,16 @@
 
 use afterlight_graph::{BufferHandle, DepthTest, Graph, RasterPass};
 
-use crate::{Info, error::TechniqueError, frame::Frame, geometry::Surfaces};
+use afterlight_frame::{Frame, Info, TechniqueError};
+use afterlight_stages::surfaces::geometry::SceneDraws;
 
 /// What the first pass draws: depth alone. In tessellated frames both passes have a geometry shader, so that their depths are
 /// equal.
 ///
 /// # Errors
 /// A shader that is not compiled in.
-pub(crate) fn depth_surfaces(frame: &Frame<'_>) -> Result<Surfaces, TechniqueError> {
-    let depth = Surfaces::depth_only(frame)?;
+pub(crate) fn depth_surfaces(frame: &Frame<'_>) -> Result<SceneDraws, TechniqueError> {
+    let depth = SceneDraws::depth_only(frame)?;
     if frame.tessellate_px.is_some() { depth.through_geometry(frame) } else { Ok(depth) }
 }
 
@@ -18,7 +19,7 @@ pub(crate) fn depth_surfaces(frame: &Frame<'_>) -> Result<Surfaces, TechniqueErr
 /// numbers triangles and hands them on whole.
 pub(crate) struct FillPass {
     /// Fragments that store their triangles.
-    pub surfaces: Surfaces,
+    pub surfaces: SceneDraws,
     numbers: Option<BufferHandle>,
 }
 
@@ -39,14 +40,14 @@ impl FillPass {
         let opaque = variant(fragment, &tags);
         let masked = variant(fragment, &[&["mask"], &tags[..]].concat());
         if !whole {
-            let fill = Surfaces::new(
+            let fill = SceneDraws::new(
                 frame,
-                ("geometry/surface.vert#position", Some(&opaque)),
-                ("geometry/surface.vert#uv", &masked),
+                ("surfaces/geometry/surface.vert#position", Some(&opaque)),
+                ("surfaces/geometry/surface.vert#uv", &masked),
             )?;
             return Ok(Self { surfaces: fill.depth(DepthTest::EQUAL), numbers: None });
         }
-        let fill = Surfaces::shaded(frame, &opaque, &masked)?.whole_triangles(frame, info.id)?;
+        let fill = SceneDraws::shaded(frame, &opaque, &masked)?.whole_triangles(frame, info.id)?;
         let numbers = graph.buffer(&format!("{}/triangle numbers", info.id), 4);
         let numbers = graph.clear_buffer(&format!("{}/clear triangle numbers", info.id), numbers, 0);
         Ok(Self { surfaces: fill.depth(DepthTest::EQUAL), numbers: Some(numbers) })

@@ -3,12 +3,12 @@
 //
 // REFERENCES: samples hold 24 bits of reference and 8 bits of coverage, as in the paper. WIDE_REFERENCES: 32 bits of reference. Else
 // a triangle's name. Where there is no coverage, which samples share a triangle is found by comparing them.
-#include "triangle_buffer/interpolate.glsl"
+#include "surfaces/triangles/interpolate.glsl"
 #if !defined(REFERENCES) && !defined(WIDE_REFERENCES)
-#include "triangle_buffer/index.glsl"
+#include "surfaces/triangles/index.glsl"
 #endif
 #define IDS_BINDING 9
-#include "multisample/triangles.glsl"
+#include "surfaces/visible/triangles.glsl"
 
 ivec2 source_pixel;
 uint source_mask;           // samples that need to be shaded
@@ -57,4 +57,4 @@ uint source_place(uint name) {
 #endif
 }
 
-#include "triangle_buffer/surface.glsl"
+#include "surfaces/triangles/surface.glsl"

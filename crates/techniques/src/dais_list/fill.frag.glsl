@@ -11,8 +11,8 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_post_depth_coverage : require
 #include "frame.glsl"
-#include "gbuffer_list/claims.glsl"
-#include "dais_list/lists.glsl"
+#include "surfaces/claims/claims.glsl"
+#include "dais_list/pixel_lists.glsl"
 #ifdef ALPHA_MASK
 #define WITH_UV
 #include "surface_in.glsl"
@@ -23,7 +23,7 @@ layout(location = 0) flat in uvec2 draw_material;
 #include "dais/memoize.glsl"
 #else
 #include "scene.glsl"
-#include "triangle_buffer/marks.glsl"
+#include "surfaces/triangles/marks.glsl"
 #endif
 
 layout(early_fragment_tests) in;

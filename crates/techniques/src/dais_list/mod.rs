@@ -4,21 +4,11 @@
 
 use afterlight_graph::{BufferHandle, Graph, ImageHandle, ImageInfo, Load, RasterPass};
 
-use crate::{
-    Answers, Exactness, Frame, Info, MULTIPLE_SAMPLES, Need, ParamInfo, ParamKind, Params, Source, Technique,
-    TechniqueError,
-    capacity::FIRST_GUESS,
-    clusters,
-    cost::{self, Cost, Workload},
-    dais::{self, Cache, FillPass},
-    dais_multirate::{FULL_RATE, LowRate, SHARE},
-    depth_prepass::FIRST_FRAGMENT,
-    frame::SourceSlots,
-    gbuffer_list::{self, NOT_TAKEN},
-    light_step,
-    scene_gpu::DRAW_TRIANGLES,
-    triangle_buffer, view,
-};
+use afterlight_shader::Shader;
+use afterlight_frame::{Answers, Exactness, Frame, Info, MULTIPLE_SAMPLES, Need, ParamInfo, ParamKind, Params, Source, SourceSlots, Technique, TechniqueError, capacity::FIRST_GUESS, scene::DRAW_TRIANGLES, views};
+use afterlight_stages::{lights::{cells, step}, surfaces::{claims::NOT_TAKEN, depth_first::FIRST_FRAGMENT, triangles}};
+use afterlight_cost::{Cost, Workload, self};
+use crate::{dais::{Cache, FillPass, self}, dais_multirate::{FULL_RATE, LowRate, SHARE}, gbuffer_list::self};
 
 /// The technique.
 pub static TECHNIQUE: DaisList = DaisList;
@@ -60,16 +50,20 @@ static INFO: Info = Info {
     },
     appendix_a: dais::APPENDIX_A,
     exactness: Exactness::Exact { min_psnr_db: 45.0 },
-    params: &[light_step::LIGHTS, NODES, BANDS, dais::CACHE_BUCKETS, FULL_RATE, SHARE],
+    params: &[step::LIGHTS, NODES, BANDS, dais::CACHE_BUCKETS, FULL_RATE, SHARE],
     needs: &[Need { name: "post-depth coverage", test: |features| features.post_depth_coverage }],
     samples: MULTIPLE_SAMPLES,
     tessellation: true,
-    views: view::TRIANGLES,
+    views: views::TRIANGLES,
 };
 
 impl Technique for DaisList {
     fn info(&self) -> &Info {
         &INFO
+    }
+
+    fn shaders(&self) -> &[Shader] {
+        &crate::SHADERS
     }
 
     fn predict(&self, workload: &Workload, _: &Params) -> Cost {
@@ -96,7 +90,7 @@ impl Technique for DaisList {
             lists.bind(pass);
             stored.bind(pass);
         };
-        let surfaces = clusters::Surfaces::of_source(source, frame.samples, |pass| bind(pass));
+        let surfaces = cells::VisibleDepths::of_source(source, frame.samples, |pass| bind(pass));
         dais::shade(graph, frame, &INFO, rate.as_ref(), (source, &surfaces), stored.records(), &bind)
     }
 }
@@ -164,13 +158,13 @@ enum Triangles {
     /// Bits that fragments set.
     Marked(BufferHandle),
     /// A list that fragments append to through the cache: tessellated triangles, whose IDs lead nowhere.
-    Listed { cache: Cache, list: triangle_buffer::List },
+    Listed { cache: Cache, list: triangles::List },
 }
 
 /// Triangles that are stored.
 enum Stored {
-    Marked(triangle_buffer::TriangleBuffer),
-    Listed(triangle_buffer::Records),
+    Marked(triangles::TriangleBuffer),
+    Listed(triangles::Records),
 }
 
 impl Triangles {
@@ -180,7 +174,7 @@ impl Triangles {
             let cache = Cache::new(graph, frame, &INFO);
             return Ok(Self::Listed {
                 cache,
-                list: triangle_buffer::List::new(graph, frame, INFO.id, most)?,
+                list: triangles::List::new(graph, frame, INFO.id, most)?,
             });
         }
         let triangles = u64::from(DRAW_TRIANGLES) * frame.scene.draw_count() as u64;
@@ -188,7 +182,7 @@ impl Triangles {
             let what = "dais-list: triangles that a reference tells apart".to_owned();
             return Err(TechniqueError::TooLarge { what, found: triangles, limit: most.into() });
         }
-        Ok(Self::Marked(triangle_buffer::bits(graph, frame, INFO.id, 0)))
+        Ok(Self::Marked(triangles::bits(graph, frame, INFO.id, 0)))
     }
 
     /// Specialization constants of the fragments that write it.
@@ -211,7 +205,7 @@ impl Triangles {
     fn store(self, graph: &mut Graph, frame: &Frame<'_>) -> Result<Stored, TechniqueError> {
         Ok(match self {
             Self::Marked(bits) => {
-                Stored::Marked(triangle_buffer::store_marked(graph, frame, INFO.id, bits, false)?)
+                Stored::Marked(triangles::store_marked(graph, frame, INFO.id, bits, false)?)
             }
             Self::Listed { list, .. } => Stored::Listed(list.derivatives(graph, frame, INFO.id)?),
         })
@@ -219,7 +213,7 @@ impl Triangles {
 }
 
 impl Stored {
-    fn records(&self) -> &triangle_buffer::Records {
+    fn records(&self) -> &triangles::Records {
         match self {
             Self::Marked(buffer) => &buffer.records,
             Self::Listed(records) => records,

@@ -1,10 +1,10 @@
 // Surfaces of a pixel from its list of references to triangles (Schied and Dachsbacher 2015, section 4.3).
 //
 // PLACES: references are places in the triangle buffer, else triangle IDs.
-#include "dais_list/lists.glsl"
-#include "triangle_buffer/interpolate.glsl"
+#include "dais_list/pixel_lists.glsl"
+#include "surfaces/triangles/interpolate.glsl"
 #ifndef PLACES
-#include "triangle_buffer/index.glsl"
+#include "surfaces/triangles/index.glsl"
 #endif
 
 layout(set = 0, binding = 9, scalar) readonly buffer Heads {
@@ -70,4 +70,4 @@ uint source_place(uint name) {
 #endif
 }
 
-#include "triangle_buffer/surface.glsl"
+#include "surfaces/triangles/surface.glsl"

@@ -4,15 +4,12 @@
 
 use afterlight_graph::{Graph, ImageHandle};
 
-use crate::{
-    Answers, Exactness, Frame, Info, ParamInfo, ParamKind, Params, Source, Technique, TechniqueError,
-    compute_raster,
-    cost::{self, Cost, Workload},
-    dais,
-    frame::SourceSlots,
-    graph::gpu,
-    light_step, view,
-};
+use afterlight_shader::Shader;
+use afterlight_frame::{Answers, Exactness, Frame, Info, ParamInfo, ParamKind, Params, Source, SourceSlots, Technique, TechniqueError, views};
+use afterlight_stages::{shared::indirect::IndirectLight, lights::step, surfaces::compute_raster};
+use afterlight_cost::{Cost, Workload, self};
+use crate::dais;
+use afterlight_graph::gpu;
 
 /// The technique.
 pub static TECHNIQUE: DaisMultirate = DaisMultirate;
@@ -83,7 +80,7 @@ impl LowRate {
                 expected: "rate=1/2, or share=grid".to_owned(),
             });
         }
-        if cell_px == 1 || !frame.has_indirect_light() {
+        if cell_px == 1 || !frame.board.has::<IndirectLight>() {
             return Ok(None);
         }
         let unavailable = |missing: String| Err(TechniqueError::Unavailable { technique: info.id, missing });
@@ -137,7 +134,7 @@ static INFO: Info = Info {
         min_psnr_db: 40.0,
     },
     params: &[
-        light_step::LIGHTS,
+        step::LIGHTS,
         RATE,
         SHARE,
         dais::FILL,
@@ -149,12 +146,16 @@ static INFO: Info = Info {
     needs: &[],
     samples: &[1, 2, 4, 8],
     tessellation: true,
-    views: view::TRIANGLES,
+    views: views::TRIANGLES,
 };
 
 impl Technique for DaisMultirate {
     fn info(&self) -> &Info {
         &INFO
+    }
+
+    fn shaders(&self) -> &[Shader] {
+        &crate::SHADERS
     }
 
     fn predict(&self, workload: &Workload, _: &Params) -> Cost {

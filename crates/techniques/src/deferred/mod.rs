@@ -4,14 +4,10 @@
 
 use afterlight_graph::{Graph, ImageHandle, Load, gpu::vk};
 
-use crate::{
-    Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError,
-    clusters::Surfaces,
-    cost::{self, Cost, Workload},
-    gbuffer,
-    light_step::{self, LightStep},
-    volumes,
-};
+use afterlight_shader::Shader;
+use afterlight_frame::{OpaqueDepth, Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError};
+use afterlight_stages::{lights::{cells::VisibleDepths, step::{LightStep, self}, volumes}, surfaces::gbuffer};
+use afterlight_cost::{Cost, Workload, self};
 
 /// The technique.
 pub static TECHNIQUE: Deferred = Deferred;
@@ -22,7 +18,7 @@ pub struct Deferred;
 static INFO: Info = Info {
     id: "deferred",
     title: "Deferred shading",
-    summary: "Surfaces fill a G-buffer; each light's volume is drawn over it and adds what the light gives.",
+    summary: "VisibleDepths fill a G-buffer; each light's volume is drawn over it and adds what the light gives.",
     sources: &[Source { key: "petrescu-2016", section: "4.3" }],
     answers: Answers {
         surface: "G-buffer, 1 sample",
@@ -40,7 +36,7 @@ static INFO: Info = Info {
         rates_decoupled: "n, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
-    params: &[light_step::GBUFFER_LIGHTS],
+    params: &[step::GBUFFER_LIGHTS],
     needs: &[],
     samples: &[1],
     tessellation: true,
@@ -52,20 +48,24 @@ impl Technique for Deferred {
         &INFO
     }
 
+    fn shaders(&self) -> &[Shader] {
+        &crate::SHADERS
+    }
+
     fn predict(&self, workload: &Workload, _: &Params) -> Cost {
         cost::deferred(workload)
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let mut filled = gbuffer::fill(graph, frame, INFO.id, vk::Format::D32_SFLOAT)?;
-        match light_step::chosen(frame, &INFO) {
+        match step::chosen(frame, &INFO) {
             "volumes" => {}
             "lists" => {
                 let lists = LightStep::lists(graph, frame, &INFO, &filled.depth)?;
                 return gbuffer::shade(graph, frame, INFO.id, filled, &lists);
             }
             _ => {
-                let surfaces = Surfaces::of_depth(&filled.depth, 1);
+                let surfaces = VisibleDepths::of_depth(&filled.depth, 1);
                 let step = LightStep::build(graph, frame, &INFO, &surfaces)?;
                 drop(surfaces);
                 return gbuffer::shade(graph, frame, INFO.id, filled, &step);
@@ -76,9 +76,9 @@ impl Technique for Deferred {
         gbuffer::bind(&mut pass, &filled);
         filled.accumulation = pass.color(filled.accumulation, Load::Keep);
         pass.depth_read_only(&filled.depth);
-        volumes::draw_all(frame, &mut pass, "volumes/light.frag", 1)?;
+        volumes::draw_all(frame, &mut pass, "lights/volumes/light.frag", 1)?;
         pass.finish();
-        frame.hand_over_depth(filled.depth);
+        frame.board.put(OpaqueDepth(filled.depth));
         Ok(filled.accumulation)
     }
 }

@@ -4,11 +4,10 @@
 
 use afterlight_graph::{Graph, ImageHandle};
 
-use crate::{
-    Answers, AppendixA, Exactness, Frame, Info, MULTIPLE_SAMPLES, Params, Source, Technique, TechniqueError,
-    cost::{Cost, Workload, deferred_dedup},
-    light_step, multisample,
-};
+use afterlight_shader::Shader;
+use afterlight_frame::{OpaqueDepth, Answers, AppendixA, Exactness, Frame, Info, MULTIPLE_SAMPLES, Params, Source, Technique, TechniqueError};
+use afterlight_cost::{Cost, Workload, deferred_dedup};
+use afterlight_stages::{lights::step, surfaces::shade};
 
 /// The technique.
 pub static TECHNIQUE: DeferredDedup = DeferredDedup;
@@ -37,11 +36,11 @@ static INFO: Info = Info {
         rates_decoupled: "n, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
-    params: &[light_step::LIGHTS],
-    needs: &[multisample::STANDARD_LOCATIONS],
+    params: &[step::LIGHTS],
+    needs: &[shade::STANDARD_LOCATIONS],
     samples: MULTIPLE_SAMPLES,
     tessellation: true,
-    views: multisample::VIEWS,
+    views: shade::VIEWS,
 };
 
 impl Technique for DeferredDedup {
@@ -49,17 +48,21 @@ impl Technique for DeferredDedup {
         &INFO
     }
 
+    fn shaders(&self) -> &[Shader] {
+        &crate::SHADERS
+    }
+
     fn predict(&self, workload: &Workload, _: &Params) -> Cost {
         deferred_dedup(workload)
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
-        let filled = multisample::fill_dedup(graph, frame, "deferred-dedup")?;
+        let filled = shade::fill_dedup(graph, frame, "deferred-dedup")?;
         let surfaces = filled.surfaces(frame);
         let source = ("dedup", frame.samples);
-        let radiance = multisample::shade(graph, frame, &INFO, source, &surfaces, &|pass| filled.bind(pass))?;
+        let radiance = shade::shade(graph, frame, &INFO, source, &surfaces, &|pass| filled.bind(pass))?;
         drop(surfaces);
-        frame.hand_over_depth(filled.depth);
+        frame.board.put(OpaqueDepth(filled.depth));
         Ok(radiance)
     }
 }

@@ -5,12 +5,10 @@
 
 use afterlight_graph::{DepthTest, Graph, ImageHandle, Load, StencilFace, StencilTest, gpu::vk};
 
-use crate::{
-    Answers, AppendixA, Exactness, Frame, Info, MULTIPLE_SAMPLES, Params, Source, Technique, TechniqueError,
-    cost::{Cost, Workload, deferred_msaa},
-    light_step,
-    multisample::{self, SampleBuffer, emission_variant},
-};
+use afterlight_shader::Shader;
+use afterlight_frame::{OpaqueDepth, Answers, AppendixA, Exactness, Frame, Info, MULTIPLE_SAMPLES, Params, Source, Technique, TechniqueError};
+use afterlight_cost::{Cost, Workload, deferred_msaa};
+use afterlight_stages::{lights::step, surfaces::shade::{SampleBuffer, emission_variant, self}};
 
 /// The technique.
 pub static TECHNIQUE: DeferredMsaa = DeferredMsaa;
@@ -42,11 +40,11 @@ static INFO: Info = Info {
         rates_decoupled: "n, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
-    params: &[light_step::LIGHTS],
-    needs: &[multisample::STANDARD_LOCATIONS],
+    params: &[step::LIGHTS],
+    needs: &[shade::STANDARD_LOCATIONS],
     samples: MULTIPLE_SAMPLES,
     tessellation: true,
-    views: multisample::VIEWS,
+    views: shade::VIEWS,
 };
 
 /// Writes the reference wherever a fragment is.
@@ -64,21 +62,25 @@ impl Technique for DeferredMsaa {
         &INFO
     }
 
+    fn shaders(&self) -> &[Shader] {
+        &crate::SHADERS
+    }
+
     fn predict(&self, workload: &Workload, _: &Params) -> Cost {
         deferred_msaa(workload)
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
-        let filled = multisample::fill_samples(graph, frame, "deferred-msaa")?;
-        let radiance = match light_step::chosen(frame, &INFO) {
+        let filled = shade::fill_samples(graph, frame, "deferred-msaa")?;
+        let radiance = match step::chosen(frame, &INFO) {
             "all" => shade_by_stencil(graph, frame, &filled)?,
             _ => {
                 let surfaces = filled.surfaces(frame);
                 let source = ("msaa", frame.samples);
-                multisample::shade(graph, frame, &INFO, source, &surfaces, &|pass| filled.bind(pass))?
+                shade::shade(graph, frame, &INFO, source, &surfaces, &|pass| filled.bind(pass))?
             }
         };
-        frame.hand_over_depth(filled.depth);
+        frame.board.put(OpaqueDepth(filled.depth));
         Ok(radiance)
     }
 }
@@ -92,11 +94,11 @@ fn shade_by_stencil(
     let stencil = graph.image("deferred-msaa/stencil", frame.image_info(frame.depth_stencil_format()));
     let radiance = graph.image("deferred-msaa/radiance", frame.image_info(vk::Format::R16G16B16A16_SFLOAT));
     let samples = [("SAMPLES", frame.samples)];
-    let mark = multisample::full_screen(frame, "multisample/mark.frag", &samples)?.stencil(MARK);
+    let mark = shade::full_screen(frame, "surfaces/shade/mark.frag", &samples)?.stencil(MARK);
     let shaded = |rate: &str| {
-        let fragment = emission_variant(frame, &format!("multisample/shade.frag#{rate}"));
+        let fragment = emission_variant(frame, &format!("surfaces/shade/shade.frag#{rate}"));
         let state =
-            multisample::full_screen(frame, &fragment, &multisample::shade_constants(frame, frame.samples))?;
+            shade::full_screen(frame, &fragment, &shade::shade_constants(frame, frame.samples))?;
         Ok::<_, TechniqueError>(state.stencil(MARKED).depth(DepthTest::OFF))
     };
     let (at_pixels, at_samples) = (shaded("pixel")?, shaded("sample")?);
@@ -107,7 +109,7 @@ fn shade_by_stencil(
     // Its depth is not used, but attached.
     let stencil = pass.depth(stencil, Load::Clear(0.0));
     pass.stencil_clear(0);
-    multisample::draw_full_screen(&mut pass, mark, 1);
+    shade::draw_full_screen(&mut pass, mark, 1);
     pass.finish();
 
     let mut pass = graph.raster("deferred-msaa/shade");
@@ -116,8 +118,8 @@ fn shade_by_stencil(
     // The two draws cover every pixel.
     let radiance = pass.color(radiance, Load::DontCare);
     let _stencil = pass.stencil(stencil, Load::Keep);
-    multisample::draw_full_screen(&mut pass, at_pixels, 0);
-    multisample::draw_full_screen(&mut pass, at_samples, 1);
+    shade::draw_full_screen(&mut pass, at_pixels, 0);
+    shade::draw_full_screen(&mut pass, at_samples, 1);
     pass.finish();
     Ok(radiance)
 }

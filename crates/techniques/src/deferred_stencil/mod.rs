@@ -4,11 +4,10 @@
 
 use afterlight_graph::{Blend, DepthTest, Graph, ImageHandle, Load, StencilFace, StencilTest, gpu::vk};
 
-use crate::{
-    Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError,
-    cost::{self, Cost, Workload},
-    gbuffer, volumes,
-};
+use afterlight_shader::Shader;
+use afterlight_frame::{OpaqueDepth, Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError};
+use afterlight_cost::{Cost, Workload, self};
+use afterlight_stages::{lights::volumes, surfaces::gbuffer};
 
 /// The technique.
 pub static TECHNIQUE: DeferredStencil = DeferredStencil;
@@ -76,6 +75,10 @@ impl Technique for DeferredStencil {
     }
 
     /// As deferred, with two draws a light, the volumes' vertices processed twice.
+    fn shaders(&self) -> &[Shader] {
+        &crate::SHADERS
+    }
+
     fn predict(&self, workload: &Workload, _: &Params) -> Cost {
         let twice = Workload {
             light_command: 2.0 * workload.light_command,
@@ -95,7 +98,7 @@ impl Technique for DeferredStencil {
             .stencil(MARK);
         let light = volumes::volume_state(
             frame,
-            Some("volumes/light.frag"),
+            Some("lights/volumes/light.frag"),
             vk::CullModeFlags::FRONT,
             vec![Blend::ADD],
         )?
@@ -106,13 +109,13 @@ impl Technique for DeferredStencil {
         gbuffer::bind(&mut pass, &filled);
         let accumulation = pass.color(filled.accumulation, Load::Keep);
         let depth = pass.stencil(filled.depth, Load::Clear(0));
-        volumes::draw_unbounded(frame, &mut pass, "volumes/light.frag", 1)?;
+        volumes::draw_unbounded(frame, &mut pass, "lights/volumes/light.frag", 1)?;
         for index in frame.lights.unbounded_count..frame.lights.count {
             pass.draw(volumes::volume_draw(frame, mark.clone(), index, 1));
             pass.draw(volumes::volume_draw(frame, light.clone(), index, 1));
         }
         pass.finish();
-        frame.hand_over_depth(depth);
+        frame.board.put(OpaqueDepth(depth));
         Ok(accumulation)
     }
 }

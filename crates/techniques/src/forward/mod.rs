@@ -4,13 +4,10 @@
 
 use afterlight_graph::{Graph, ImageHandle, Load, gpu::vk};
 
-use crate::{
-    ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError,
-    cost::{Cost, Workload, forward},
-    geometry::Surfaces,
-    radiance_target::RadianceTarget,
-    view::{INVOCATIONS, InvocationCount},
-};
+use afterlight_shader::Shader;
+use afterlight_frame::{VisitsAllLights, OpaqueDepth, ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError, views::INVOCATIONS};
+use afterlight_cost::{Cost, Workload, forward};
+use afterlight_stages::{surfaces::{geometry::SceneDraws, RadianceTarget}, views::InvocationCount};
 
 /// The technique.
 pub static TECHNIQUE: Forward = Forward;
@@ -51,6 +48,10 @@ impl Technique for Forward {
         &INFO
     }
 
+    fn shaders(&self) -> &[Shader] {
+        &crate::SHADERS
+    }
+
     fn predict(&self, workload: &Workload, _: &Params) -> Cost {
         forward(workload, 1.0)
     }
@@ -68,15 +69,9 @@ impl Technique for Forward {
         let depth = pass.depth(depth, Load::Clear(0.0));
         surfaces.draw(frame, &mut pass);
         pass.finish();
-        frame.hand_over_depth(depth);
+        frame.board.put(OpaqueDepth(depth));
+        frame.board.put(VisitsAllLights);
         count.map_or(Ok(radiance), |count| count.heat(graph, frame, "forward"))
     }
 }
 
-/// Surfaces shaded by a loop over all lights; they count their fragments where that is to be shown.
-pub(crate) fn shaded_surfaces(frame: &Frame<'_>) -> Result<Surfaces, TechniqueError> {
-    match frame.shows(INVOCATIONS) {
-        true => Surfaces::shaded(frame, "forward/forward.frag#count", "forward/forward.frag#mask-count"),
-        false => Surfaces::shaded(frame, "forward/forward.frag", "forward/forward.frag#mask"),
-    }
-}

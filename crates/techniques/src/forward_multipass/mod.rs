@@ -6,13 +6,10 @@ use afterlight_graph::{Blend, DepthTest, Graph, ImageHandle, Load, RasterPass, R
 use afterlight_scene::Aabb;
 use glam::{Mat4, Vec3};
 
-use crate::{
-    Answers, AppendixA, Exactness, Frame, Info, ParamInfo, ParamKind, Params, Source, Technique,
-    TechniqueError,
-    cost::{Cost, Workload, forward},
-    depth_prepass::FIRST_FRAGMENT,
-    geometry::Surfaces,
-};
+use afterlight_shader::Shader;
+use afterlight_frame::{OpaqueDepth, Answers, AppendixA, Exactness, Frame, Info, ParamInfo, ParamKind, Params, Source, Technique, TechniqueError};
+use afterlight_cost::{Cost, Workload, forward};
+use afterlight_stages::surfaces::{depth_first::FIRST_FRAGMENT, geometry::SceneDraws};
 
 /// The technique.
 pub static TECHNIQUE: ForwardMultipass = ForwardMultipass;
@@ -63,6 +60,10 @@ impl Technique for ForwardMultipass {
         &INFO
     }
 
+    fn shaders(&self) -> &[Shader] {
+        &crate::SHADERS
+    }
+
     fn predict(&self, workload: &Workload, _: &Params) -> Cost {
         forward(workload, 1.0 + workload.lights)
     }
@@ -71,7 +72,7 @@ impl Technique for ForwardMultipass {
         let radiance =
             graph.image("forward-multipass/radiance", frame.image_info(vk::Format::R16G16B16A16_SFLOAT));
         let depth = graph.image("forward-multipass/depth", frame.image_info(vk::Format::D32_SFLOAT_S8_UINT));
-        let ambient = Surfaces::shaded(
+        let ambient = SceneDraws::shaded(
             frame,
             "forward_multipass/light.frag#ambient",
             "forward_multipass/light.frag#ambient-mask",
@@ -91,7 +92,7 @@ impl Technique for ForwardMultipass {
         let depth = pass.stencil(depth, Load::Keep);
         draw_lights(frame, &mut pass)?;
         pass.finish();
-        frame.hand_over_depth(depth);
+        frame.board.put(OpaqueDepth(depth));
         Ok(radiance)
     }
 }
@@ -99,7 +100,7 @@ impl Technique for ForwardMultipass {
 /// Draws all surfaces once a light. Surfaces of one depth must not both add: the stencil lets the first of a pixel pass.
 fn draw_lights(frame: &Frame<'_>, pass: &mut RasterPass<'_>) -> Result<(), TechniqueError> {
     let mut surfaces =
-        Surfaces::shaded(frame, "forward_multipass/light.frag", "forward_multipass/light.frag#mask")?
+        SceneDraws::shaded(frame, "forward_multipass/light.frag", "forward_multipass/light.frag#mask")?
             .depth(DepthTest::EQUAL)
             .stencil(FIRST_FRAGMENT, 1)
             .blend(vec![Blend::ADD]);
@@ -128,53 +129,3 @@ fn draw_lights(frame: &Frame<'_>, pass: &mut RasterPass<'_>) -> Result<(), Techn
     Ok(())
 }
 
-/// Pixels that a box may cover: all where it reaches behind the eye's plane, none where it lies outside the image.
-pub(crate) fn screen_rect(clip_from_world: Mat4, bounds: &Aabb, whole: Rect) -> Option<Rect> {
-    let corners = (0..8).map(|i| {
-        let pick = glam::BVec3::new(i & 1 != 0, i & 2 != 0, i & 4 != 0);
-        clip_from_world * Vec3::select(pick, bounds.max, bounds.min).extend(1.0)
-    });
-    let (mut low, mut high) = (glam::Vec2::INFINITY, glam::Vec2::NEG_INFINITY);
-    for c in corners {
-        if c.w <= 1e-6 {
-            return Some(whole);
-        }
-        let ndc = c.truncate().truncate() / c.w;
-        (low, high) = (low.min(ndc), high.max(ndc));
-    }
-    let size = glam::Vec2::new(whole.width_px as f32, whole.height_px as f32);
-    // A pixel more on each side than rounding can move a bound.
-    let low = ((low * 0.5 + 0.5) * size - 1.0).floor().max(glam::Vec2::ZERO);
-    let high = ((high * 0.5 + 0.5) * size + 1.0).ceil().min(size);
-    low.cmplt(high).all().then_some(Rect {
-        x_px: low.x as u32,
-        y_px: low.y as u32,
-        width_px: (high.x - low.x) as u32,
-        height_px: (high.y - low.y) as u32,
-    })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use afterlight_scene::Camera;
-    use proptest::prelude::*;
-
-    const WHOLE: Rect = Rect { x_px: 0, y_px: 0, width_px: 100, height_px: 60 };
-
-    proptest! {
-        /// Every pixel whose ray meets the box lies in the rectangle.
-        #[test]
-        fn the_rectangle_covers_the_box(c in prop::array::uniform3(-8f32..8.0), r in 0.1f32..3.0, p in prop::array::uniform3(-1f32..1.0)) {
-            let clip = Camera::look_at("c", Vec3::new(0.0, 1.0, 9.0), Vec3::ZERO, 1.0, 0.1);
-            let clip = clip.clip_from_view(100.0 / 60.0) * clip.view_from_world();
-            let bounds = Aabb { min: Vec3::from(c) - r, max: Vec3::from(c) + r };
-            let q = clip * (Vec3::from(c) + Vec3::from(p) * r).extend(1.0);
-            prop_assume!(q.w > 0.0 && q.x.abs() <= q.w && q.y.abs() <= q.w);
-            let (x, y) = ((q.x / q.w * 0.5 + 0.5) * 100.0, (q.y / q.w * 0.5 + 0.5) * 60.0);
-            let rect = screen_rect(clip, &bounds, WHOLE).expect("a point of the box is on the image");
-            prop_assert!(x >= rect.x_px as f32 && x <= (rect.x_px + rect.width_px) as f32);
-            prop_assert!(y >= rect.y_px as f32 && y <= (rect.y_px + rect.height_px) as f32);
-        }
-    }
-}

@@ -4,12 +4,10 @@
 
 use afterlight_graph::{Graph, ImageHandle};
 
-use crate::{
-    ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError,
-    clusters::{self, Division},
-    cost::{Cost, Workload, forward_plus},
-    light_step::record_forward,
-};
+use afterlight_shader::Shader;
+use afterlight_frame::{ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError};
+use afterlight_stages::{lights::cells::{Division, self}, surfaces::depth_first::record_forward};
+use afterlight_cost::{Cost, Workload, forward_plus};
 
 /// The technique.
 pub static TECHNIQUE: ForwardPlus = ForwardPlus;
@@ -41,7 +39,7 @@ static INFO: Info = Info {
         rates_decoupled: "n, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
-    params: &[clusters::TILE_PX],
+    params: &[cells::TILE_PX],
     needs: &[],
     samples: ANY_SAMPLES,
     tessellation: true,
@@ -49,12 +47,16 @@ static INFO: Info = Info {
 };
 
 fn division(params: &Params) -> Division {
-    Division::Tiles25d { tile_px: params.count(&clusters::TILE_PX) }
+    Division::Tiles25d { tile_px: params.count(&cells::TILE_PX) }
 }
 
 impl Technique for ForwardPlus {
     fn info(&self) -> &Info {
         &INFO
+    }
+
+    fn shaders(&self) -> &[Shader] {
+        &crate::SHADERS
     }
 
     fn predict(&self, workload: &Workload, params: &Params) -> Cost {

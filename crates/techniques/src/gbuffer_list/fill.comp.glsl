@@ -19,7 +19,7 @@
 
 layout(local_size_x = 8, local_size_y = 8) in;
 #define IDS_BINDING 8
-#include "multisample/triangles.glsl"
+#include "surfaces/visible/triangles.glsl"
 
 ivec2 pixel;
 

@@ -10,7 +10,7 @@
 #include "surface_in.glsl"
 #include "gbuffer_list/build_list.glsl"
 #include "gbuffer_list/filter.glsl"
-#include "gbuffer_list/claims.glsl"
+#include "surfaces/claims/claims.glsl"
 
 layout(early_fragment_tests) in;
 layout(post_depth_coverage) in;

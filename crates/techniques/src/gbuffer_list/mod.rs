@@ -8,15 +8,10 @@ use afterlight_graph::{
     BufferHandle, DepthTest, Graph, ImageHandle, Load, StencilFace, StencilTest, gpu::vk,
 };
 
-use crate::{
-    ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, ParamInfo, ParamKind, Params, Source, Technique,
-    TechniqueError, clusters, compute_raster,
-    cost::{self, Cost, Workload},
-    depth_prepass::FIRST_FRAGMENT,
-    geometry::Surfaces,
-    light_step,
-    multisample::{self, Visible},
-};
+use afterlight_shader::Shader;
+use afterlight_frame::{OpaqueDepth, ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, ParamInfo, ParamKind, Params, Source, Technique, TechniqueError};
+use afterlight_stages::{lights::{cells, step}, surfaces::{compute_raster, depth_first::FIRST_FRAGMENT, geometry::SceneDraws, shade::self, visible::Visible}};
+use afterlight_cost::{Cost, Workload, self};
 
 /// The technique.
 pub static TECHNIQUE: GbufferList = GbufferList;
@@ -72,7 +67,7 @@ static INFO: Info = Info {
     // Texture gradients are analytic where compute fills.
     exactness: Exactness::Exact { min_psnr_db: 45.0 },
     params: &[
-        light_step::LIGHTS,
+        step::LIGHTS,
         FILL,
         compute_raster::VISIBILITY,
         compute_raster::SMALL,
@@ -89,10 +84,10 @@ static INFO: Info = Info {
         filter::OBJECTS,
         filter::EDGE_THRESHOLD,
     ],
-    needs: &[multisample::STANDARD_LOCATIONS],
+    needs: &[shade::STANDARD_LOCATIONS],
     samples: ANY_SAMPLES,
     tessellation: false,
-    views: multisample::VIEWS,
+    views: shade::VIEWS,
 };
 
 /// Most blocks that a narrow pointer tells apart: 26 bits of index.
@@ -188,12 +183,6 @@ impl Layout {
     }
 }
 
-/// Passes where no fragment before has set the stencil bit, and leaves it.
-pub(crate) const NOT_TAKEN: StencilTest = {
-    let face = StencilFace { compare: vk::CompareOp::NOT_EQUAL, ..StencilFace::KEEP };
-    StencilTest { front: face, back: face, compare_mask: 0xff, write_mask: 0 }
-};
-
 /// The lists of a frame: blocks, and the counter of dynamic ones.
 struct Lists {
     blocks: BufferHandle,
@@ -210,6 +199,10 @@ enum Samples {
 impl Technique for GbufferList {
     fn info(&self) -> &Info {
         &INFO
+    }
+
+    fn shaders(&self) -> &[Shader] {
+        &crate::SHADERS
     }
 
     fn predict(&self, workload: &Workload, params: &Params) -> Cost {
@@ -229,11 +222,11 @@ impl Technique for GbufferList {
             Samples::Depth(_) => "list",
         };
         let surfaces = match &lists.samples {
-            Samples::Keys(keys) => clusters::Surfaces::of_keys(keys, layout.samples),
-            Samples::Depth(depth) => clusters::Surfaces::of_depth(depth, layout.samples),
+            Samples::Keys(keys) => cells::VisibleDepths::of_keys(keys, layout.samples),
+            Samples::Depth(depth) => cells::VisibleDepths::of_depth(depth, layout.samples),
         };
         let radiance =
-            multisample::shade(graph, frame, &INFO, (source, layout.samples), &surfaces, &|pass| {
+            shade::shade(graph, frame, &INFO, (source, layout.samples), &surfaces, &|pass| {
                 for (name, value) in layout.constants() {
                     pass.constant(name, value);
                 }
@@ -246,7 +239,7 @@ impl Technique for GbufferList {
             })?;
         drop(surfaces);
         if let Samples::Depth(depth) = lists.samples {
-            frame.hand_over_depth(depth);
+            frame.board.put(OpaqueDepth(depth));
         }
         Ok(radiance)
     }
@@ -266,22 +259,6 @@ fn empty_lists(
     let blocks = graph.clear_buffer("gbuffer-list/clear blocks", blocks, 0);
     let count = graph.clear_buffer("gbuffer-list/clear count", count, 0);
     Ok((blocks, count, flagged))
-}
-
-/// Declares the claims by which masked surfaces of one depth share the samples of a pixel (`claims.glsl`); none where the scene
-/// has no masked surfaces.
-pub(crate) fn claims(
-    graph: &mut Graph,
-    frame: &Frame<'_>,
-    technique: &str,
-    samples: u32,
-) -> Option<BufferHandle> {
-    frame.scene.has_masked().then(|| {
-        let bits = if samples > 8 { 16 } else { 8 };
-        let pixels = u64::from(frame.width_px) * u64::from(frame.height_px);
-        let claims = graph.buffer(&format!("{technique}/claims"), 4 * (pixels * bits).div_ceil(32));
-        graph.clear_buffer(&format!("{technique}/clear claims"), claims, 0)
-    })
 }
 
 /// Specialization constants of shaders that build the lists.
@@ -332,12 +309,12 @@ fn fill_by_raster(graph: &mut Graph, frame: &Frame<'_>, layout: &Layout) -> Resu
     }
     let depth =
         graph.image("gbuffer-list/depth", frame.multisampled_info(frame.small_depth_stencil_format()));
-    let depth_only = Surfaces::depth_only(frame)?;
+    let depth_only = SceneDraws::depth_only(frame)?;
     let (opaque, masked) = match layout.samples {
         1 => ("gbuffer_list/fill.frag#one", "gbuffer_list/fill.frag#one-mask"),
         _ => ("gbuffer_list/fill.frag", "gbuffer_list/fill.frag#mask"),
     };
-    let mut fill = Surfaces::shaded(frame, opaque, masked)?
+    let mut fill = SceneDraws::shaded(frame, opaque, masked)?
         .depth(DepthTest::EQUAL)
         // Section 4.3: one bit of stencil against double writes of intersecting triangles.
         .stencil(FIRST_FRAGMENT, 1);

@@ -6,16 +6,11 @@ use afterlight_graph::{
     Blend, BufferHandle, DepthTest, Graph, ImageHandle, Load, RasterPass, StencilFace, StencilTest, gpu::vk,
 };
 
-use crate::{
-    Answers, AppendixA, Exactness, Frame, Info, Need, ParamInfo, ParamKind, Params, Source, Technique,
-    TechniqueError,
-    cost::{self, Cost, Workload},
-    depth_prepass::FIRST_FRAGMENT,
-    gbuffer::{self, GBuffer},
-    geometry::Surfaces,
-    light_prepass::{self, SUMS},
-    multisample,
-};
+use afterlight_shader::Shader;
+use afterlight_frame::{Answers, AppendixA, Exactness, Frame, Info, Need, ParamInfo, ParamKind, Params, Source, Technique, TechniqueError};
+use afterlight_cost::{Cost, Workload, self};
+use afterlight_stages::surfaces::{depth_first::FIRST_FRAGMENT, gbuffer::{GBuffer, self}, geometry::SceneDraws, shade};
+use crate::light_prepass::{SUMS, self};
 use paths::{Path, Run};
 
 mod paths;
@@ -113,7 +108,7 @@ impl Draws {
         &self,
         frame: &Frame<'_>,
         pass: &mut RasterPass<'_>,
-        surfaces: impl Fn(Path) -> Option<&'s Surfaces>,
+        surfaces: impl Fn(Path) -> Option<&'s SceneDraws>,
     ) {
         for (i, run) in self.runs.iter().enumerate() {
             if let Some(surfaces) = surfaces(run.path) {
@@ -129,6 +124,10 @@ impl Technique for Hybrid {
     }
 
     /// The model's objects are alike, so all take the path that reads and writes less.
+    fn shaders(&self) -> &[Shader] {
+        &crate::SHADERS
+    }
+
     fn predict(&self, workload: &Workload, params: &Params) -> Cost {
         let [deferred, prepass] = [0.0, 1.0].map(|share| cost::hybrid(workload, share));
         let weight = f64::from(params.get(&PREPASS_WEIGHT).parse::<f32>().unwrap_or(1.0));
@@ -159,10 +158,10 @@ impl Technique for Hybrid {
 /// First pass: draws fill the G-buffer as a whole, or but normal and roughness, in the order of all techniques.
 fn fill(graph: &mut Graph, frame: &Frame<'_>, draws: &Draws) -> Result<GBuffer, TechniqueError> {
     let mut whole =
-        Surfaces::shaded(frame, "gbuffer/gbuffer.frag", "gbuffer/gbuffer.frag#mask")?.stencil(OWNER, COLORED);
+        SceneDraws::shaded(frame, "surfaces/gbuffer/gbuffer.frag", "surfaces/gbuffer/gbuffer.frag#mask")?.stencil(OWNER, COLORED);
     whole.blend = vec![Blend::REPLACE; 4];
     let mut lobe =
-        Surfaces::shaded(frame, "light_prepass/lobe.frag#gbuffer", "light_prepass/lobe.frag#gbuffer-mask")?
+        SceneDraws::shaded(frame, "light_prepass/lobe.frag#gbuffer", "light_prepass/lobe.frag#gbuffer-mask")?
             .stencil(OWNER, COLORLESS);
     // Accumulation and base colour stay.
     lobe.blend = vec![Blend::NONE, Blend::NONE, Blend::REPLACE, Blend::REPLACE];
@@ -181,7 +180,7 @@ fn apply_materials(
     sums: &[ImageHandle; 3],
     draws: &Draws,
 ) -> Result<ImageHandle, TechniqueError> {
-    let again = Surfaces::shaded(frame, "light_prepass/material.frag", "light_prepass/material.frag#mask")?
+    let again = SceneDraws::shaded(frame, "light_prepass/material.frag", "light_prepass/material.frag#mask")?
         .depth(DepthTest::EQUAL)
         .stencil(FIRST_FRAGMENT, COLORED);
     let mut pass = graph.raster("hybrid/materials");
@@ -203,7 +202,7 @@ fn apply_materials(
 /// Adds what pixels with colours reflect of the light that they gathered.
 fn compose(frame: &Frame<'_>, pass: &mut RasterPass<'_>) -> Result<(), TechniqueError> {
     let state =
-        multisample::full_screen(frame, "hybrid/compose.frag", &[])?.stencil(OWNED).blend(vec![Blend::ADD]);
-    multisample::draw_full_screen(pass, state, COLORED);
+        shade::full_screen(frame, "hybrid/compose.frag", &[])?.stencil(OWNED).blend(vec![Blend::ADD]);
+    shade::draw_full_screen(pass, state, COLORED);
     Ok(())
 }

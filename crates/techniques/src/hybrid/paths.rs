@@ -6,12 +6,8 @@ use std::ops::Range;
 use afterlight_graph::Rect;
 use glam::{Mat4, Vec3};
 
-use crate::{
-    Frame,
-    forward_multipass::screen_rect,
-    scene::Aabb,
-    scene_gpu::{BUCKETS, Bucket, DrawInfo},
-};
+use afterlight_frame::{Frame, camera_view::screen_rect, scene::{BUCKETS, Bucket, DrawInfo}};
+use afterlight_scene::Aabb;
 
 /// How a draw gets its colours.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -174,7 +170,7 @@ fn runs(paths: [Vec<Path>; BUCKETS]) -> Vec<Run> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene_gpu::TextureFetches;
+    use afterlight_frame::scene::TextureFetches;
     use afterlight_scene::Camera;
 
     fn footprint(x: Span, distance: f32) -> Footprint {

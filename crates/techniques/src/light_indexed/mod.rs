@@ -4,11 +4,10 @@
 
 use afterlight_graph::{Graph, ImageHandle, gpu::vk};
 
-use crate::{
-    Answers, AppendixA, Frame, Info, Params, Source, Technique, TechniqueError,
-    cost::{self, Cost, Workload},
-    gbuffer, light_indices,
-};
+use afterlight_shader::Shader;
+use afterlight_frame::{Answers, AppendixA, Frame, Info, Params, Source, Technique, TechniqueError};
+use afterlight_cost::{Cost, Workload, self};
+use afterlight_stages::{lights::indices, surfaces::gbuffer};
 
 /// The technique.
 pub static TECHNIQUE: LightIndexed = LightIndexed;
@@ -40,8 +39,8 @@ static INFO: Info = Info {
         material_access: "seq",
         rates_decoupled: "n, n",
     },
-    exactness: light_indices::EXACTNESS,
-    params: &[light_indices::INDEX_PARTS],
+    exactness: indices::EXACTNESS,
+    params: &[indices::INDEX_PARTS],
     needs: &[],
     samples: &[1],
     tessellation: true,
@@ -53,13 +52,17 @@ impl Technique for LightIndexed {
         &INFO
     }
 
+    fn shaders(&self) -> &[Shader] {
+        &crate::SHADERS
+    }
+
     fn predict(&self, workload: &Workload, params: &Params) -> Cost {
-        cost::light_indexed(workload, light_indices::floats(workload, params, &INFO))
+        cost::light_indexed(workload, indices::floats(workload, params, &INFO))
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let filled = gbuffer::fill(graph, frame, INFO.id, vk::Format::D32_SFLOAT)?;
-        let lights = light_indices::build(graph, frame, &INFO, &filled.depth)?;
+        let lights = indices::build(graph, frame, &INFO, &filled.depth)?;
         gbuffer::shade_by(graph, frame, (INFO.id, "light_indexed/shade.comp"), filled, |pass| {
             lights.bind(pass);
             let (constant, value) = lights.constant();

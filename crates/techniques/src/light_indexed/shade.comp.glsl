@@ -2,10 +2,10 @@
 // In: the packed indices, and as below.
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#include "light_indices/indices.glsl"
+#include "lights/indices/indices.glsl"
 
 vec3 lights_radiance(ShadingPoint p, uvec2 pixel, float distance_m) {
     return indexed_radiance(p, pixel);
 }
 
-#include "gbuffer/shade_pixels.glsl"
+#include "surfaces/gbuffer/shade_pixels.glsl"

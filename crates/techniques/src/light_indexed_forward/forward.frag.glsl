@@ -1,10 +1,10 @@
 // Forward shading by the at most four lights whose indices a pixel holds (Petrescu et al. 2016, section 4.7, LiF).
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#include "light_indices/indices.glsl"
+#include "lights/indices/indices.glsl"
 
 vec3 lights_radiance(ShadingPoint p, uvec2 pixel, float distance_m) {
     return indexed_radiance(p, pixel);
 }
 
-#include "depth_prepass/shade_visible.glsl"
+#include "surfaces/depth_first/shade_visible.glsl"

@@ -4,12 +4,10 @@
 
 use afterlight_graph::{Graph, ImageHandle};
 
-use crate::{
-    Answers, AppendixA, Frame, Info, Params, Source, Technique, TechniqueError,
-    cost::{self, Cost, Workload},
-    depth_prepass::{draw_depth, shade_visible},
-    light_indices,
-};
+use afterlight_shader::Shader;
+use afterlight_frame::{Answers, AppendixA, Frame, Info, Params, Source, Technique, TechniqueError};
+use afterlight_cost::{Cost, Workload, self};
+use afterlight_stages::{lights::indices, surfaces::depth_first::{draw_depth, shade_visible}};
 
 /// The technique.
 pub static TECHNIQUE: LightIndexedForward = LightIndexedForward;
@@ -41,8 +39,8 @@ static INFO: Info = Info {
         material_access: "seq",
         rates_decoupled: "n, n",
     },
-    exactness: light_indices::EXACTNESS,
-    params: &[light_indices::INDEX_PARTS],
+    exactness: indices::EXACTNESS,
+    params: &[indices::INDEX_PARTS],
     needs: &[],
     samples: &[1],
     tessellation: true,
@@ -54,13 +52,17 @@ impl Technique for LightIndexedForward {
         &INFO
     }
 
+    fn shaders(&self) -> &[Shader] {
+        &crate::SHADERS
+    }
+
     fn predict(&self, workload: &Workload, params: &Params) -> Cost {
-        cost::light_indexed_forward(workload, light_indices::floats(workload, params, &INFO))
+        cost::light_indexed_forward(workload, indices::floats(workload, params, &INFO))
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let depth = draw_depth(graph, frame, INFO.id)?;
-        let lights = light_indices::build(graph, frame, &INFO, &depth)?;
+        let lights = indices::build(graph, frame, &INFO, &depth)?;
         let (name, images) = lights.constant();
         let constants = vec![(name.to_owned(), images)];
         let shader = (INFO.id, "light_indexed_forward/forward.frag");

@@ -4,18 +4,16 @@
 
 use afterlight_graph::{Graph, ImageHandle, gpu::vk};
 
-use crate::{
-    Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError,
-    cost::{self, Cost, Workload},
-    gbuffer, light_lists,
-    light_step::LightStep,
-};
+use afterlight_shader::Shader;
+use afterlight_frame::{Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError};
+use afterlight_cost::{Cost, Workload, self};
+use afterlight_stages::{lights::{pixel_lists, step::LightStep}, surfaces::gbuffer};
 
 /// The technique.
-pub static TECHNIQUE: LightList = LightList;
+pub static TECHNIQUE: SceneLights = SceneLights;
 
 /// See the module.
-pub struct LightList;
+pub struct SceneLights;
 
 static INFO: Info = Info {
     id: "light-list",
@@ -41,20 +39,24 @@ static INFO: Info = Info {
         rates_decoupled: "n, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
-    params: &[light_lists::NODES],
+    params: &[pixel_lists::NODES],
     needs: &[],
     samples: &[1],
     tessellation: true,
     views: &[],
 };
 
-impl Technique for LightList {
+impl Technique for SceneLights {
     fn info(&self) -> &Info {
         &INFO
     }
 
+    fn shaders(&self) -> &[Shader] {
+        &crate::SHADERS
+    }
+
     fn predict(&self, workload: &Workload, _: &Params) -> Cost {
-        cost::light_list(&light_lists::with_lists(workload))
+        cost::light_list(&pixel_lists::with_lists(workload))
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {

@@ -4,13 +4,10 @@
 
 use afterlight_graph::{Graph, ImageHandle};
 
-use crate::{
-    ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError,
-    cost::{self, Cost, Workload},
-    depth_prepass::draw_depth,
-    light_lists,
-    light_step::{LightStep, shade_forward},
-};
+use afterlight_shader::Shader;
+use afterlight_frame::{ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError};
+use afterlight_cost::{Cost, Workload, self};
+use afterlight_stages::{lights::{pixel_lists, step::LightStep}, surfaces::depth_first::{draw_depth, shade_forward}};
 
 /// The technique.
 pub static TECHNIQUE: LightListForward = LightListForward;
@@ -42,7 +39,7 @@ static INFO: Info = Info {
         rates_decoupled: "n, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
-    params: &[light_lists::NODES],
+    params: &[pixel_lists::NODES],
     needs: &[],
     samples: ANY_SAMPLES,
     tessellation: true,
@@ -54,8 +51,12 @@ impl Technique for LightListForward {
         &INFO
     }
 
+    fn shaders(&self) -> &[Shader] {
+        &crate::SHADERS
+    }
+
     fn predict(&self, workload: &Workload, _: &Params) -> Cost {
-        cost::light_list_forward(&light_lists::with_lists(workload))
+        cost::light_list_forward(&pixel_lists::with_lists(workload))
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {

@@ -4,13 +4,10 @@
 
 use afterlight_graph::{DepthTest, Graph, ImageHandle, Load, gpu::vk};
 
-use crate::{
-    Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError,
-    cost::{self, Cost, Workload},
-    depth_prepass::FIRST_FRAGMENT,
-    geometry::Surfaces,
-    volumes,
-};
+use afterlight_shader::Shader;
+use afterlight_frame::{OpaqueDepth, Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError};
+use afterlight_cost::{Cost, Workload, self};
+use afterlight_stages::{lights::volumes, surfaces::{depth_first::FIRST_FRAGMENT, geometry::SceneDraws}};
 
 /// The technique.
 pub static TECHNIQUE: LightPrepass = LightPrepass;
@@ -64,6 +61,10 @@ impl Technique for LightPrepass {
         &INFO
     }
 
+    fn shaders(&self) -> &[Shader] {
+        &crate::SHADERS
+    }
+
     fn predict(&self, workload: &Workload, _: &Params) -> Cost {
         cost::light_prepass(workload)
     }
@@ -81,7 +82,7 @@ fn fill(graph: &mut Graph, frame: &Frame<'_>) -> Result<LobeBuffer, TechniqueErr
     let normal = graph.image("light-prepass/normal", frame.image_info(vk::Format::R16G16_UNORM));
     let roughness = graph.image("light-prepass/roughness", frame.image_info(vk::Format::R8_UNORM));
     let depth = graph.image("light-prepass/depth", frame.image_info(vk::Format::D32_SFLOAT_S8_UINT));
-    let surfaces = Surfaces::shaded(frame, "light_prepass/lobe.frag", "light_prepass/lobe.frag#mask")?;
+    let surfaces = SceneDraws::shaded(frame, "light_prepass/lobe.frag", "light_prepass/lobe.frag#mask")?;
     let mut pass = graph.raster("light-prepass/gbuffer");
     frame.bind_scene(&mut pass);
     let filled = LobeBuffer {
@@ -129,7 +130,7 @@ fn apply_materials(
 ) -> Result<ImageHandle, TechniqueError> {
     let radiance = graph.image("light-prepass/radiance", frame.image_info(vk::Format::R16G16B16A16_SFLOAT));
     let surfaces =
-        Surfaces::shaded(frame, "light_prepass/material.frag", "light_prepass/material.frag#mask")?
+        SceneDraws::shaded(frame, "light_prepass/material.frag", "light_prepass/material.frag#mask")?
             .depth(DepthTest::EQUAL)
             .stencil(FIRST_FRAGMENT, 1);
     let mut pass = graph.raster("light-prepass/materials");
@@ -141,6 +142,6 @@ fn apply_materials(
     let depth = pass.stencil(depth, Load::Keep);
     surfaces.draw(frame, &mut pass);
     pass.finish();
-    frame.hand_over_depth(depth);
+    frame.board.put(OpaqueDepth(depth));
     Ok(radiance)
 }

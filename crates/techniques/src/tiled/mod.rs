@@ -4,11 +4,10 @@
 
 use afterlight_graph::{Graph, ImageHandle, gpu::vk};
 
-use crate::{
-    Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError,
-    cost::{Cost, Workload, tiled_deferred},
-    gbuffer,
-};
+use afterlight_shader::Shader;
+use afterlight_frame::{OpaqueDepth, Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError};
+use afterlight_cost::{Cost, Workload, tiled_deferred};
+use afterlight_stages::surfaces::gbuffer;
 
 /// The technique.
 pub static TECHNIQUE: Tiled = Tiled;
@@ -49,6 +48,10 @@ impl Technique for Tiled {
         &INFO
     }
 
+    fn shaders(&self) -> &[Shader] {
+        &crate::SHADERS
+    }
+
     fn predict(&self, workload: &Workload, _: &Params) -> Cost {
         tiled_deferred(workload)
     }
@@ -61,7 +64,7 @@ impl Technique for Tiled {
         let radiance = pass.write("hdr", filled.accumulation);
         pass.dispatch(frame.groups(16));
         pass.finish();
-        frame.hand_over_depth(filled.depth);
+        frame.board.put(OpaqueDepth(filled.depth));
         Ok(radiance)
     }
 }

@@ -4,16 +4,10 @@
 
 use afterlight_graph::{Graph, ImageHandle, Load, gpu::vk};
 
-use crate::{
-    Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError,
-    clusters::Surfaces,
-    compute_raster,
-    cost::{Cost, Workload, visibility_buffer},
-    frame::SourceSlots,
-    geometry,
-    light_step::{self, LightStep},
-    multisample::add_volumes,
-};
+use afterlight_shader::Shader;
+use afterlight_frame::{OpaqueDepth, Answers, AppendixA, Exactness, Frame, Info, Params, Source, SourceSlots, Technique, TechniqueError};
+use afterlight_stages::{lights::{cells::VisibleDepths, step::{LightStep, self}}, surfaces::{compute_raster, geometry, shade::add_volumes}};
+use afterlight_cost::{Cost, Workload, visibility_buffer};
 
 /// The technique.
 pub static TECHNIQUE: Visibility = Visibility;
@@ -42,7 +36,7 @@ static INFO: Info = Info {
         rates_decoupled: "y, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 45.0 },
-    params: &[light_step::LIGHTS, compute_raster::VISIBILITY, compute_raster::SMALL],
+    params: &[step::LIGHTS, compute_raster::VISIBILITY, compute_raster::SMALL],
     needs: &[],
     samples: &[1],
     tessellation: false,
@@ -57,6 +51,10 @@ impl Technique for Visibility {
         &INFO
     }
 
+    fn shaders(&self) -> &[Shader] {
+        &crate::SHADERS
+    }
+
     fn predict(&self, workload: &Workload, _: &Params) -> Cost {
         visibility_buffer(workload)
     }
@@ -67,10 +65,10 @@ impl Technique for Visibility {
         }
         let ids = graph.image("visibility/ids", frame.image_info(vk::Format::R32_UINT));
         let depth = graph.image("visibility/depth", frame.image_info(vk::Format::D32_SFLOAT));
-        let surfaces = geometry::Surfaces::new(
+        let surfaces = geometry::SceneDraws::new(
             frame,
-            ("geometry/surface.vert#position", Some("visibility/ids.frag")),
-            ("geometry/surface.vert#uv", "visibility/ids.frag#mask"),
+            ("surfaces/geometry/surface.vert#position", Some("surfaces/visible/ids.frag")),
+            ("surfaces/geometry/surface.vert#uv", "surfaces/visible/ids.frag#mask"),
         )?;
 
         let mut pass = graph.raster("visibility/ids");
@@ -79,10 +77,10 @@ impl Technique for Visibility {
         let depth = pass.depth(depth, Load::Clear(0.0));
         surfaces.draw(frame, &mut pass);
         pass.finish();
-        let radiance = shade(graph, frame, "", &Surfaces::of_depth(&depth, 1), &|pass| {
+        let radiance = shade(graph, frame, "", &SceneDraws::of_depth(&depth, 1), &|pass| {
             pass.read_image("ids", &ids);
         })?;
-        frame.hand_over_depth(depth);
+        frame.board.put(OpaqueDepth(depth));
         Ok(radiance)
     }
 }
@@ -90,7 +88,7 @@ impl Technique for Visibility {
 /// The same from triangles that compute has found.
 fn shade_keys(graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
     let keys = compute_raster::rasterize(graph, frame, &INFO, 1)?;
-    shade(graph, frame, "#keys", &Surfaces::of_keys(&keys, 1), &|pass| {
+    shade(graph, frame, "#keys", &SceneDraws::of_keys(&keys, 1), &|pass| {
         pass.constant("SAMPLES", 1);
         pass.read_buffer("SampleKeys", &keys);
         pass.read_buffer("DrawCommands", &frame.buffers.commands);
@@ -102,7 +100,7 @@ fn shade(
     graph: &mut Graph,
     frame: &Frame<'_>,
     tag: &str,
-    surfaces: &Surfaces<'_>,
+    surfaces: &SceneDraws<'_>,
     bind: &dyn Fn(&mut dyn SourceSlots),
 ) -> Result<ImageHandle, TechniqueError> {
     let step = LightStep::build(graph, frame, &INFO, surfaces)?;

@@ -6,7 +6,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #define EXPLICIT_GRADIENTS
-#include "light_step/radiance.glsl"
+#include "lights/step/radiance.glsl"
 #include "visibility/surface.glsl"
 
 layout(set = 0, binding = 12, rgba16f) writeonly uniform image2D hdr;

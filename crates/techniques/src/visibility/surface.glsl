@@ -4,7 +4,7 @@
 #include "triangle.glsl"
 
 #ifdef SAMPLES_IN_KEYS
-#include "compute_raster/key_ids.glsl"
+#include "surfaces/compute_raster/key_ids.glsl"
 
 uint visible_triangle(ivec2 pixel) {
     uint order = sample_order(pixel, 0u);

@@ -10,39 +10,11 @@ use afterlight_graph::{
     gpu::{self, SamplerDesc, vk},
 };
 
-use crate::{error::TechniqueError, frame::Frame, geometry::Surfaces, present, view};
+use afterlight_frame::{Post, Frame, TechniqueError, views};
+use crate::{compose::present, surfaces::geometry::SceneDraws};
 
 /// Layout in which uploads leave images.
 const UPLOADED: vk::ImageLayout = vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL;
-
-/// Anti-aliasing after shading.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum Post {
-    /// None.
-    #[default]
-    None,
-    /// Fast approximate anti-aliasing 3.11, quality (Lottes 2009).
-    Fxaa,
-    /// Enhanced subpixel morphological anti-aliasing, one sample (Jimenez et al. 2012).
-    Smaa,
-    /// Subpixel reconstruction anti-aliasing (Chajdas et al. 2011).
-    Sraa,
-}
-
-impl Post {
-    /// All of them.
-    pub const ALL: [Post; 4] = [Post::None, Post::Fxaa, Post::Smaa, Post::Sraa];
-
-    /// Name on the command line and in run records.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Post::None => "none",
-            Post::Fxaa => "fxaa",
-            Post::Smaa => "smaa",
-            Post::Sraa => "sraa",
-        }
-    }
-}
 
 /// Declares the tone map and the filter after it; returns the final image, RGBA8, sRGB-encoded.
 ///
@@ -50,7 +22,7 @@ impl Post {
 ///
 /// # Errors
 /// A shader that is not compiled in; a device without what the filter needs.
-pub(crate) fn finish(
+pub fn finish(
     device: &gpu::Device,
     graph: &mut Graph,
     frame: &Frame<'_>,
@@ -58,7 +30,7 @@ pub(crate) fn finish(
     post: Post,
 ) -> Result<ImageHandle, TechniqueError> {
     // A debug view is no picture: its colours are values.
-    if post == Post::None || !frame.shows(view::FINAL) {
+    if post == Post::None || !frame.shows(views::FINAL) {
         return present::present(graph, frame, hdr);
     }
     let color = present::display(graph, frame, hdr, "post/color")?;
@@ -86,7 +58,7 @@ fn fxaa(
     shown: &Shown<'_>,
     target: ImageHandle,
 ) -> Result<ImageHandle, TechniqueError> {
-    let mut pass = frame.compute(graph, "post/fxaa", &frame.shader("post/fxaa.comp")?);
+    let mut pass = frame.compute(graph, "post/fxaa", &frame.shader("compose/post/fxaa.comp")?);
     pass.read_sampled("color", shown.color, SamplerDesc::LINEAR).read("hdr", shown.hdr);
     let target = pass.write("final_color", target);
     pass.dispatch(frame.groups(8));
@@ -107,20 +79,20 @@ fn smaa(
     let edges = graph.image("post/smaa edges", frame.image_info(vk::Format::R8G8_UNORM));
     let weights = graph.image("post/smaa weights", frame.image_info(vk::Format::R8G8B8A8_UNORM));
 
-    let mut pass = frame.compute(graph, "post/smaa-edges", &frame.shader("post/smaa_edges.comp")?);
+    let mut pass = frame.compute(graph, "post/smaa-edges", &frame.shader("compose/post/smaa_edges.comp")?);
     pass.read("color", shown.color);
     let edges = pass.write("edges", edges);
     pass.dispatch(frame.groups(8));
     pass.finish();
 
-    let mut pass = frame.compute(graph, "post/smaa-weights", &frame.shader("post/smaa_weights.comp")?);
+    let mut pass = frame.compute(graph, "post/smaa-weights", &frame.shader("compose/post/smaa_weights.comp")?);
     pass.read_sampled("edges", &edges, SamplerDesc::LINEAR);
     pass.read_sampled("area", &area, SamplerDesc::LINEAR).read("search", &search);
     let weights = pass.write("weights", weights);
     pass.dispatch(frame.groups(8));
     pass.finish();
 
-    let mut pass = frame.compute(graph, "post/smaa-blend", &frame.shader("post/smaa_blend.comp")?);
+    let mut pass = frame.compute(graph, "post/smaa-blend", &frame.shader("compose/post/smaa_blend.comp")?);
     pass.read("color", shown.color).read("hdr", shown.hdr).read("weights", &weights);
     let target = pass.write("final_color", target);
     pass.dispatch(frame.groups(8));
@@ -174,7 +146,7 @@ fn sraa(
     let (sample_surfaces, sample_depths) = surfaces(graph, frame, "visibility", samples)?;
     let (center_surfaces, center_depths) = surfaces(graph, frame, "centers", 1)?;
 
-    let mut pass = frame.compute(graph, "post/sraa", &frame.shader("post/sraa.comp")?);
+    let mut pass = frame.compute(graph, "post/sraa", &frame.shader("compose/post/sraa.comp")?);
     pass.constant("SAMPLES", samples).read("color", shown.color).read("hdr", shown.hdr);
     pass.read("sample_surfaces", &sample_surfaces).read("sample_depths", &sample_depths);
     pass.read("center_surfaces", &center_surfaces).read("center_depths", &center_depths);
@@ -204,7 +176,7 @@ fn surfaces(
     };
     let planes = image(graph, "surfaces", vk::Format::R8G8B8A8_UNORM);
     let depths = image(graph, "depths", vk::Format::D32_SFLOAT);
-    let surfaces = Surfaces::shaded(frame, "post/sraa.frag", "post/sraa.frag#mask")?;
+    let surfaces = SceneDraws::shaded(frame, "compose/post/sraa.frag", "compose/post/sraa.frag#mask")?;
     let mut pass = graph.raster(&format!("post/sraa-{what}"));
     frame.bind_scene(&mut pass);
     // Depth 0 tells what holds nothing: the planes need no clear.

@@ -13,7 +13,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "frame.glsl"
 #include "packing.glsl"
-#include "post/blend.glsl"
+#include "compose/post/blend.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(set = 0, binding = 8) uniform texture2D color;

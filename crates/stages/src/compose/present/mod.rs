@@ -2,7 +2,7 @@
 
 use afterlight_graph::{Graph, ImageHandle, gpu::vk};
 
-use crate::{error::TechniqueError, frame::Frame, view};
+use afterlight_frame::{Frame, TechniqueError, views};
 
 /// Declares the pass `present/tonemap`: Khronos PBR Neutral, sRGB, 8 bits; debug views, which are colours already, keep
 /// theirs. Compute, since a full-screen fragment pass
@@ -24,16 +24,16 @@ pub fn present(
 ///
 /// # Errors
 /// A shader that is not compiled in.
-pub(crate) fn display(
+pub fn display(
     graph: &mut Graph,
     frame: &Frame<'_>,
     hdr: &ImageHandle,
     name: &str,
 ) -> Result<ImageHandle, TechniqueError> {
     let target = graph.image(name, frame.image_info(vk::Format::R8G8B8A8_UNORM));
-    let shader = match frame.shows(view::FINAL) {
-        true => frame.shader("present/tonemap.comp")?,
-        false => frame.shader("present/tonemap.comp#colors")?,
+    let shader = match frame.shows(views::FINAL) {
+        true => frame.shader("compose/present/tonemap.comp")?,
+        false => frame.shader("compose/present/tonemap.comp#colors")?,
     };
     let mut pass = frame.compute(graph, "present/tonemap", &shader);
     pass.read("hdr", hdr);

@@ -5,7 +5,7 @@
 // culling of back faces are here.
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#include "light_step/radiance.glsl"
+#include "lights/step/radiance.glsl"
 #include "surface_in.glsl"
 
 layout(set = 0, binding = 1) uniform utexture2D draw_data;

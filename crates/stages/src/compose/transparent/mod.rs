@@ -1,53 +1,26 @@
 //! Surfaces with alpha blending, over the opaque image of any technique: sorted back to front on the CPU, shaded forward.
 //! See the README of this folder.
 
-mod sort;
-
-pub(crate) use sort::Blended;
-
 use afterlight_graph::{
     Blend, BlendEquation, BufferHandle, DepthTest, DrawCall, Graph, ImageHandle, Load, RasterPass,
     gpu::{self, vk},
 };
 
-use crate::{
-    SceneGpu, Settings, draw_list::COMMAND_BYTES, error::TechniqueError, frame::Frame, geometry::Surfaces,
-    light_step::LightStep, multisample, renderer::View, scene_gpu::Bucket, view,
-};
-use sort::ViewOrder;
+use afterlight_frame::{scene::blended::ViewOrder, OpaqueDepth, VisitsAllLights, Transparency, CameraView, Frame, SceneGpu, Settings, TechniqueError, scene::{Bucket, draw_list::COMMAND_BYTES}, views};
+use crate::{lights::step::LightStep, surfaces::{geometry::SceneDraws, shade}};
 
 /// Triangles that are sorted at most; where the scene has more, draws are.
 pub const SORTED_TRIANGLES_MAX: usize = 100_000;
 
-/// How surfaces with alpha blending are drawn.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum Transparency {
-    /// Not at all.
-    None,
-    /// From back to front, after the opaque surfaces.
-    #[default]
-    Sorted,
-}
-
-impl Transparency {
-    /// Name on the command line and in run records.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Transparency::None => "none",
-            Transparency::Sorted => "sorted",
-        }
-    }
-}
-
 /// Whether a frame of those settings shows surfaces with alpha blending: debug views are of what the technique did.
 fn is_drawn(settings: &Settings, scene: &SceneGpu) -> bool {
     settings.transparency == Transparency::Sorted
-        && settings.view == view::FINAL
+        && settings.view == views::FINAL
         && scene.blended.triangle_count() > 0
 }
 
 /// Why the order is coarser than was asked for.
-pub(crate) fn warning(settings: &Settings, scene: &SceneGpu) -> Option<String> {
+pub fn warning(settings: &Settings, scene: &SceneGpu) -> Option<String> {
     let found = scene.blended.triangle_count();
     (is_drawn(settings, scene) && found > SORTED_TRIANGLES_MAX).then(|| {
         format!(
@@ -58,7 +31,7 @@ pub(crate) fn warning(settings: &Settings, scene: &SceneGpu) -> Option<String> {
 }
 
 /// The triangles with alpha blending that a view needs, in drawing order.
-pub(crate) struct BlendedList {
+pub struct BlendedList {
     indices: gpu::Buffer,
     commands: gpu::Buffer,
     /// One word: the number of commands.
@@ -77,7 +50,7 @@ impl BlendedList {
         device: &gpu::Device,
         scene: &SceneGpu,
         settings: &Settings,
-        view: &View,
+        view: &CameraView,
         cull: bool,
     ) -> Result<Option<Self>, gpu::GpuError> {
         if !is_drawn(settings, scene) {
@@ -121,22 +94,21 @@ impl BlendedList {
     }
 }
 
-/// Declares the passes that draw blended surfaces over the opaque radiance `hdr` of a technique; returns its next version. Over
-/// `forward`, the reference, every fragment visits every light.
+/// Declares the passes that draw blended surfaces over the opaque radiance `hdr` of a technique; returns its next version. Where the board
+/// says so ([`VisitsAllLights`]) every fragment visits every light.
 ///
 /// # Errors
 /// A shader that is not compiled in.
-pub(crate) fn draw(
+pub fn draw(
     graph: &mut Graph,
     frame: &Frame<'_>,
     list: &BlendedList,
-    technique: &str,
     hdr: ImageHandle,
 ) -> Result<ImageHandle, TechniqueError> {
     let depth = opaque_depth(graph, frame)?;
-    let lights = match technique {
-        "forward" => LightStep::All,
-        _ => LightStep::anywhere(graph, frame, "shared/transparent")?,
+    let lights = match frame.board.has::<VisitsAllLights>() {
+        true => LightStep::All,
+        false => LightStep::anywhere(graph, frame, "shared/transparent")?,
     };
     let drawn = BlendedDraws {
         lights,
@@ -166,11 +138,11 @@ pub(crate) fn draw(
     pass.finish();
 
     let composite =
-        multisample::full_screen(frame, "transparent/composite.frag", &[])?.blend(vec![LAYERS_OVER_RADIANCE]);
+        shade::full_screen(frame, "compose/transparent/composite.frag", &[])?.blend(vec![LAYERS_OVER_RADIANCE]);
     let mut pass = graph.raster("shared/transparent composite");
     pass.read("layers", &layers);
     let hdr = pass.color(hdr, Load::Keep);
-    multisample::draw_full_screen(&mut pass, composite, 0);
+    shade::draw_full_screen(&mut pass, composite, 0);
     pass.finish();
     Ok(hdr)
 }
@@ -182,11 +154,11 @@ fn opaque_depth(graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, Tec
         let found = depth.info();
         (found.width, found.height, found.samples) == (image.width, image.height, image.samples)
     };
-    if let Some(depth) = frame.opaque_depth.take().filter(fits) {
+    if let Some(OpaqueDepth(depth)) = frame.board.take().filter(|OpaqueDepth(depth)| fits(depth)) {
         return Ok(depth);
     }
     let depth = graph.image("shared/transparent depth", image);
-    Ok(Surfaces::depth_only(frame)?.fill_depth(graph, frame, "shared/transparent depth", depth))
+    Ok(SceneDraws::depth_only(frame)?.fill_depth(graph, frame, "shared/transparent depth", depth))
 }
 
 /// A sorted list as the graph knows it, and how its surfaces find their lights.
@@ -202,8 +174,8 @@ impl BlendedDraws {
     /// Adds all of them to a pass in one call, so that their order is that of the list. The state is one for all: the shader drops
     /// what culling would.
     fn draw(&self, frame: &Frame<'_>, pass: &mut RasterPass<'_>, blend: Blend) -> Result<(), TechniqueError> {
-        let shader = "transparent/blend.frag";
-        let mut surfaces = Surfaces::shaded(frame, shader, shader)?.depth(NEARER).blend(vec![blend]);
+        let shader = "compose/transparent/blend.frag";
+        let mut surfaces = SceneDraws::shaded(frame, shader, shader)?.depth(NEARER).blend(vec![blend]);
         surfaces.constants = self.lights.constants();
         self.lights.bind(frame, pass);
         // With a count on the device, as all draws of a frame: after such calls, one without drew nothing on lavapipe.

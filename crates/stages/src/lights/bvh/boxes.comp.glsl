@@ -4,7 +4,7 @@
 // In: light_spheres. In and out: boxes, RGBA32F, two texels a node: least and greatest corner, world space.
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#include "light_bvh/tree.glsl"
+#include "lights/bvh/tree.glsl"
 
 layout(local_size_x = 32) in;   // TREE_WIDTH
 layout(constant_id = 8) const uint LEVEL = 1u;

@@ -1,7 +1,7 @@
 // Boxes of the tree over the lights, for those who read them.
 #ifndef AFTERLIGHT_LIGHT_BOXES
 #define AFTERLIGHT_LIGHT_BOXES
-#include "light_bvh/tree.glsl"
+#include "lights/bvh/tree.glsl"
 
 layout(set = 0, binding = 36) uniform texture2D light_boxes;
 

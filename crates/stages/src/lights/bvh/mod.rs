@@ -4,10 +4,7 @@
 
 use afterlight_graph::{Graph, ImageHandle, ImageInfo, gpu::vk};
 
-use crate::{
-    error::TechniqueError,
-    frame::{Frame, Slots},
-};
+use afterlight_frame::{Frame, Slots, TechniqueError};
 
 /// Children of a node: `TREE_WIDTH` in `tree.glsl`.
 const WIDTH: u32 = 32;
@@ -41,7 +38,7 @@ pub fn build(graph: &mut Graph, frame: &Frame<'_>, technique: &str) -> Result<Li
     if counts.is_empty() {
         return Ok(LightBvh { boxes: None });
     }
-    let shader = frame.shader("light_bvh/boxes.comp")?;
+    let shader = frame.shader("lights/bvh/boxes.comp")?;
     let nodes: u32 = counts.iter().sum();
     let info = ImageInfo::new(vk::Format::R32G32B32A32_SFLOAT, ROW_TEXELS, (2 * nodes).div_ceil(ROW_TEXELS));
     let mut boxes = graph.image(&format!("{technique}/light boxes"), info);

@@ -1,7 +1,7 @@
 // Light at a point by the tree over the lights: every surface walks down to the lights around it.
 #ifndef AFTERLIGHT_LIGHT_TREE_VISIT
 #define AFTERLIGHT_LIGHT_TREE_VISIT
-#include "light_bvh/boxes.glsl"
+#include "lights/bvh/boxes.glsl"
 #include "shading.glsl"
 
 vec3 tree_leaf_radiance(ShadingPoint p, uint leaf) {

@@ -8,7 +8,7 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_ballot : require
-#include "clusters/bounds.glsl"
+#include "lights/cells/bounds.glsl"
 #include "light_cone.glsl"
 
 layout(local_size_x = 32) in;   // TREE_WIDTH

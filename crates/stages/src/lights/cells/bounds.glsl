@@ -4,8 +4,8 @@
 // CPU twin: crates/oracle/src/clusters.rs.
 #ifndef AFTERLIGHT_CLUSTER_BOUNDS
 #define AFTERLIGHT_CLUSTER_BOUNDS
-#include "clusters/grid.glsl"
-#include "light_bvh/boxes.glsl"
+#include "lights/cells/grid.glsl"
+#include "lights/bvh/boxes.glsl"
 
 // A part of the view: a frustum cut off at two view distances, the box around it along the camera's axes, and the one along
 // the world's.

@@ -1,8 +1,8 @@
 // Light by the lists of cells. Lights are visited in their order, so that sums do not depend on the schedule.
 #ifndef AFTERLIGHT_CLUSTER_LISTS
 #define AFTERLIGHT_CLUSTER_LISTS
-#include "clusters/grid.glsl"
-#include "light_bvh/visit.glsl"
+#include "lights/cells/grid.glsl"
+#include "lights/bvh/visit.glsl"
 #include "shading.glsl"
 
 layout(set = 0, binding = 32, scalar) readonly buffer Cells {

@@ -4,8 +4,8 @@
 // them; CellCount: cells in all, and those without room. Numbers of cells depend on the order in which groups run; lists do not.
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#include "clusters/grid.glsl"
-#include "clusters/surfaces.glsl"
+#include "lights/cells/grid.glsl"
+#include "lights/cells/surfaces.glsl"
 
 layout(local_size_x = 256) in;
 layout(set = 0, binding = 48, scalar) writeonly buffer Cells {

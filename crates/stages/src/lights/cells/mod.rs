@@ -8,13 +8,8 @@ use afterlight_graph::{BufferHandle, ComputePass, Graph, ImageHandle};
 
 use afterlight_shader::Shader;
 
-use crate::{
-    ParamInfo, ParamKind, Params,
-    capacity::FIRST_GUESS,
-    error::TechniqueError,
-    frame::{Frame, Slots},
-    light_bvh::{self, LightBvh},
-};
+use afterlight_frame::{Frame, Params, params::{CLUSTER_PX, SLICES, SLICING}, Slots, TechniqueError, capacity::FIRST_GUESS};
+use crate::lights::bvh::{LightBvh, self};
 
 /// How the view is divided.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,41 +38,6 @@ pub struct Grid {
     /// Whether slices end at equal ratios of view distance; else in equal steps.
     pub logarithmic: bool,
 }
-
-/// Most slices: words of bits that `cells.comp.glsl` has for a tile.
-const SLICES_MAX: i64 = 256;
-
-/// Parameters of techniques with clusters.
-pub const PARAMS: &[ParamInfo] = &[CLUSTER_PX, SLICES, SLICING];
-
-/// Width of clusters.
-pub const CLUSTER_PX: ParamInfo = ParamInfo {
-    key: "cluster-px",
-    summary: "width and height of a cluster, pixels",
-    kind: ParamKind::Integer { min: 8, max: 256 },
-    default: "16",
-};
-/// Slices of view distance.
-pub const SLICES: ParamInfo = ParamInfo {
-    key: "slices",
-    summary: "clusters of a tile, one behind the other, between the ends of the scene",
-    kind: ParamKind::Integer { min: 1, max: SLICES_MAX as _ },
-    default: "128",
-};
-/// Where slices end.
-pub const SLICING: ParamInfo = ParamInfo {
-    key: "slicing",
-    summary: "view distances at which clusters end: in equal steps, or at equal ratios",
-    kind: ParamKind::Choice { values: &["logarithmic", "uniform"] },
-    default: "logarithmic",
-};
-/// Width of tiles.
-pub const TILE_PX: ParamInfo = ParamInfo {
-    key: "tile-px",
-    summary: "width and height of a tile, pixels",
-    kind: ParamKind::Integer { min: 8, max: 256 },
-    default: "16",
-};
 
 impl Grid {
     /// The grid that [`PARAMS`] ask for.
@@ -133,7 +93,7 @@ impl Division {
 }
 
 /// Where view distances of what shows come from.
-pub struct Surfaces<'a> {
+pub struct VisibleDepths<'a> {
     /// Tag of `clusters/cells.comp`.
     tag: String,
     /// Samples a pixel.
@@ -141,7 +101,7 @@ pub struct Surfaces<'a> {
     bind: Box<dyn Fn(&mut ComputePass<'_>) + 'a>,
 }
 
-impl<'a> Surfaces<'a> {
+impl<'a> VisibleDepths<'a> {
     /// A depth buffer of that many samples a pixel, reversed.
     pub fn of_depth(depth: &'a ImageHandle, samples: u32) -> Self {
         let tag = if samples == 1 { "#one" } else { "" };
@@ -162,17 +122,17 @@ impl<'a> Surfaces<'a> {
     }
 
     /// Samples a pixel.
-    pub(crate) fn samples(&self) -> u32 {
+    pub fn samples(&self) -> u32 {
         self.samples
     }
 
     /// Tag of the variants of `clusters/cells.comp` and `light_lists/heads.comp` that read it.
-    pub(crate) fn tag(&self) -> &str {
+    pub fn tag(&self) -> &str {
         &self.tag
     }
 
     /// Binds what a shader with `surfaces.glsl` reads.
-    pub(crate) fn bind(&self, shader: &Shader, pass: &mut ComputePass<'_>) {
+    pub fn bind(&self, shader: &Shader, pass: &mut ComputePass<'_>) {
         if shader.reflection.spec_constant("SAMPLES").is_some() {
             pass.constant("SAMPLES", self.samples);
         }
@@ -180,7 +140,7 @@ impl<'a> Surfaces<'a> {
     }
 
     /// What a variant `#tag` of `clusters/cells.comp` reads.
-    pub(crate) fn of_source(tag: &str, samples: u32, bind: impl Fn(&mut ComputePass<'_>) + 'a) -> Self {
+    pub fn of_source(tag: &str, samples: u32, bind: impl Fn(&mut ComputePass<'_>) + 'a) -> Self {
         Self { tag: format!("#{tag}"), samples, bind: Box::new(bind) }
     }
 }
@@ -229,10 +189,10 @@ pub fn build(
     frame: &Frame<'_>,
     technique: &str,
     division: Division,
-    surfaces: &Surfaces<'_>,
+    surfaces: &VisibleDepths<'_>,
 ) -> Result<CellLists, TechniqueError> {
     let stage = Stage::new(frame, technique, division)?;
-    let tree = light_bvh::build(graph, frame, technique)?;
+    let tree = bvh::build(graph, frame, technique)?;
     let found = stage.find_cells(graph, surfaces)?;
     let (lists, ends) = stage.assign(graph, &found, &tree)?;
     Ok(CellLists { constants: stage.constants, tree, cells: found.cells, words: found.words, ends, lists })
@@ -294,11 +254,11 @@ impl<'a> Stage<'a> {
     }
 
     /// Cells that hold a surface.
-    fn find_cells(&self, graph: &mut Graph, surfaces: &Surfaces<'_>) -> Result<FoundCells, TechniqueError> {
+    fn find_cells(&self, graph: &mut Graph, surfaces: &VisibleDepths<'_>) -> Result<FoundCells, TechniqueError> {
         let cells = graph.buffer(&self.name("cells"), 16 * u64::from(self.cell_capacity.max(1)));
         let words = graph.buffer(&self.name("cell words"), 8 * self.words.max(1));
         let count = self.zeroed(graph, "cell count");
-        let shader = self.frame.shader(&format!("clusters/cells.comp{}", surfaces.tag))?;
+        let shader = self.frame.shader(&format!("lights/cells/cells.comp{}", surfaces.tag))?;
         let mut pass = self.pass(graph, "cells", &shader);
         surfaces.bind(&shader, &mut pass);
         let cells = pass.write("Cells", cells);
@@ -320,7 +280,7 @@ impl<'a> Stage<'a> {
         let lists = graph.buffer(&self.name("cell lists"), 4 * u64::from(self.list_capacity.max(1)));
         let ends = graph.buffer(&self.name("list ends"), 8 * u64::from(self.cell_capacity.max(1)));
         let count = self.zeroed(graph, "list count");
-        let mut pass = self.pass(graph, "assign lights", &self.frame.shader("clusters/assign.comp")?);
+        let mut pass = self.pass(graph, "assign lights", &self.frame.shader("lights/cells/assign.comp")?);
         pass.read("Cells", &found.cells).read("CellCount", &found.count);
         tree.bind(self.frame, &mut pass);
         let lists = pass.write("CellLists", lists);

@@ -6,7 +6,7 @@
 #include "shading.glsl"
 #include "dais_list/source_dais_list.glsl"
 #else
-#include "multisample/sample_depth.glsl"
+#include "surfaces/visible/sample_depth.glsl"
 #endif
 
 void visit_distance(float distance_m);

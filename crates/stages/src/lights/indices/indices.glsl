@@ -1,7 +1,7 @@
 // The at most four lights whose indices a pixel holds (Petrescu et al. 2016, section 4.7).
 #ifndef AFTERLIGHT_LIGHT_INDICES
 #define AFTERLIGHT_LIGHT_INDICES
-#include "light_indices/parts.glsl"
+#include "lights/indices/parts.glsl"
 #include "shading.glsl"
 
 layout(set = 0, binding = 14) uniform texture2D light_parts_0;

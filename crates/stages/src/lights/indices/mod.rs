@@ -4,10 +4,10 @@
 use afterlight_graph::{Blend, BlendEquation, Graph, ImageHandle, Load, gpu::vk};
 use glam::Mat4;
 
-use crate::{
-    Exactness, Frame, Info, LightList, ParamInfo, ParamKind, Params, TechniqueError, cost::Workload,
-    frame::Slots, scene::Light, volumes,
-};
+use afterlight_frame::{Exactness, Frame, Info, ParamInfo, ParamKind, Params, SceneLights, Slots, TechniqueError};
+use afterlight_cost::Workload;
+use afterlight_scene::Light;
+use crate::lights::volumes;
 
 /// Parts of a light's index.
 pub const INDEX_PARTS: ParamInfo = ParamInfo {
@@ -18,7 +18,7 @@ pub const INDEX_PARTS: ParamInfo = ParamInfo {
 };
 
 /// What both techniques keep of the lights.
-pub(crate) const EXACTNESS: Exactness = Exactness::Approximate {
+pub const EXACTNESS: Exactness = Exactness::Approximate {
     bound: "of the lights with an end that reach a pixel's surface the four nearest, by the view distance of their centres; exact where no more than four do",
     min_psnr_db: 10.0,
 };
@@ -61,7 +61,7 @@ fn images(params: &Params, info: &Info, lights: u32) -> Result<u32, u32> {
 }
 
 /// Floats a pixel of the packed indices, for predictions.
-pub(crate) fn floats(workload: &Workload, params: &Params, info: &Info) -> f64 {
+pub fn floats(workload: &Workload, params: &Params, info: &Info) -> f64 {
     let images = images(params, info, workload.lights as u32).unwrap_or(MOST_IMAGES);
     f64::from(2 * images)
 }
@@ -106,7 +106,7 @@ pub fn build(
     let images = cleared.into_iter().map(|image| pass.color(image, Load::Clear([0.0; 4]))).collect();
     pass.depth_read_only(depth);
     if bounded > 0 {
-        let fragment = format!("light_indices/pack.frag#{count}");
+        let fragment = format!("lights/indices/pack.frag#{count}");
         let blend = vec![SHIFT; count as usize];
         let state = volumes::ordered_state(frame, &fragment, vk::CullModeFlags::FRONT, blend)?
             .depth(volumes::BEHIND_SURFACE)
@@ -134,7 +134,7 @@ impl LightIndices {
 
 /// Numbers of the lights with an end, those whose centre is farthest along the view direction first; of equals the last first, so
 /// that the first are kept.
-fn far_to_near(lights: &LightList, clip_from_world: Mat4) -> Vec<u32> {
+fn far_to_near(lights: &SceneLights, clip_from_world: Mat4) -> Vec<u32> {
     let mut keyed: Vec<(f32, u32)> = (lights.unbounded_count..lights.count)
         .map(|i| (beyond_near(&lights.lights[i as usize], clip_from_world), i))
         .collect();
@@ -203,7 +203,7 @@ mod tests {
     #[test]
     fn images_have_room() {
         assert_eq!([1, 2, 3].map(room), [80, 6560, 531_440]);
-        let info = crate::find("light-indexed").expect("there").info();
+        let info = afterlight_techniques::find("light-indexed").expect("there").info();
         let with = |parts: &str, lights| {
             let mut params = Params::default();
             params.set(info, INDEX_PARTS.key, parts).expect("a value");
@@ -216,7 +216,7 @@ mod tests {
 
     #[test]
     fn nearness_grows_towards_the_eye_in_every_projection() {
-        use crate::scene::{Camera, LightKind, Projection};
+        use afterlight_scene::{Camera, LightKind, Projection};
         use glam::Vec3;
         let at = |z| Light {
             kind: LightKind::Point,

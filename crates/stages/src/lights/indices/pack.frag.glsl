@@ -4,8 +4,8 @@
 // In: surface_depth. Out: IMAGES images of four parts, RGBA16F, blended as new + old / 4.
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#include "light_indices/parts.glsl"
-#include "volumes/reach.glsl"
+#include "lights/indices/parts.glsl"
+#include "lights/volumes/reach.glsl"
 
 layout(location = 0) flat in uint light_index;
 layout(location = 0) out vec4 parts_out[IMAGES];

@@ -7,7 +7,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "culling.glsl"
-#include "light_lists/head.glsl"
+#include "lights/pixel_lists/head.glsl"
 
 layout(early_fragment_tests) in;
 

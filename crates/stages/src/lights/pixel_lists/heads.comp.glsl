@@ -4,8 +4,8 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "frame.glsl"
-#include "clusters/surfaces.glsl"
-#include "light_lists/head.glsl"
+#include "lights/cells/surfaces.glsl"
+#include "lights/pixel_lists/head.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(set = 0, binding = 48, scalar) writeonly buffer LightHeads {

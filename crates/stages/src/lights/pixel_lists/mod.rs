@@ -2,15 +2,9 @@
 
 use afterlight_graph::{BufferHandle, DepthTest, Graph, ImageHandle, gpu::vk};
 
-use crate::{
-    Frame, ParamInfo, ParamKind, TechniqueError,
-    capacity::FIRST_GUESS,
-    clusters::Surfaces,
-    cost::Workload,
-    frame::Slots,
-    light_bvh::{self, LightBvh},
-    volumes,
-};
+use afterlight_frame::{Frame, ParamInfo, ParamKind, Slots, TechniqueError, capacity::FIRST_GUESS};
+use crate::lights::{bvh::{LightBvh, self}, cells::VisibleDepths, volumes};
+use afterlight_cost::Workload;
 
 /// Nodes of the lists.
 pub const NODES: ParamInfo = ParamInfo {
@@ -43,14 +37,14 @@ pub struct LightLists {
 pub fn build(
     graph: &mut Graph,
     frame: &Frame<'_>,
-    info: &crate::Info,
-    surfaces: &Surfaces<'_>,
+    info: &afterlight_frame::Info,
+    surfaces: &VisibleDepths<'_>,
     depth: Option<&ImageHandle>,
 ) -> Result<LightLists, TechniqueError> {
     let fixed: Option<u32> = frame.params.text(info, NODES.key).parse().ok();
     let capacity = fixed.unwrap_or_else(|| frame.capacity(COUNTER, FIRST_GUESS));
     frame.check_binding(info.id, "light nodes", 8 * u64::from(capacity))?;
-    let tree = light_bvh::build(graph, frame, info.id)?;
+    let tree = bvh::build(graph, frame, info.id)?;
     let mut heads = empty_heads(graph, frame, info.id, surfaces)?;
     let count = graph.buffer(&format!("{}/light node count", info.id), 8);
     let mut count = graph.clear_buffer(&format!("{}/clear light node count", info.id), count, 0);
@@ -59,8 +53,8 @@ pub fn build(
     let bounded = frame.lights.bounded_count();
     if bounded > 0 {
         let (test, shader) = match depth {
-            Some(_) => (volumes::BEHIND_SURFACE, "light_lists/append.frag#one"),
-            None => (DepthTest::OFF, "light_lists/append.frag"),
+            Some(_) => (volumes::BEHIND_SURFACE, "lights/pixel_lists/append.frag#one"),
+            None => (DepthTest::OFF, "lights/pixel_lists/append.frag"),
         };
         let state = volumes::volume_state(frame, Some(shader), vk::CullModeFlags::FRONT, Vec::new())?
             .depth(test)
@@ -92,12 +86,12 @@ fn empty_heads(
     graph: &mut Graph,
     frame: &Frame<'_>,
     technique: &str,
-    surfaces: &Surfaces<'_>,
+    surfaces: &VisibleDepths<'_>,
 ) -> Result<BufferHandle, TechniqueError> {
     let bytes = 12 * u64::from(frame.width_px) * u64::from(frame.height_px);
     frame.check_binding(technique, "light heads", bytes)?;
     let heads = graph.buffer(&format!("{technique}/light heads"), bytes);
-    let shader = frame.shader(&format!("light_lists/heads.comp{}", surfaces.tag()))?;
+    let shader = frame.shader(&format!("lights/pixel_lists/heads.comp{}", surfaces.tag()))?;
     let mut pass = frame.compute(graph, &format!("{technique}/heads"), &shader);
     surfaces.bind(&shader, &mut pass);
     let heads = pass.write("LightHeads", heads);

@@ -2,8 +2,8 @@
 // of a list, else a node's number plus one. A head also has the view distances between which the list holds.
 #ifndef AFTERLIGHT_LIGHT_LISTS
 #define AFTERLIGHT_LIGHT_LISTS
-#include "light_bvh/visit.glsl"
-#include "light_lists/head.glsl"
+#include "lights/bvh/visit.glsl"
+#include "lights/pixel_lists/head.glsl"
 #include "shading.glsl"
 
 layout(set = 0, binding = 37, scalar) readonly buffer LightHeads {

@@ -3,25 +3,14 @@
 
 use afterlight_graph::{Graph, ImageHandle};
 
-use crate::{
-    Info, ParamInfo, ParamKind, Params, TechniqueError,
-    clusters::{self, CellLists, Division, Grid, Surfaces},
-    depth_prepass::{draw_depth, shade_visible},
-    frame::{Frame, Slots},
-    light_bvh::{self, LightBvh},
-    light_lists::{self, LightLists},
-    view,
-};
+use afterlight_frame::{Frame, Info, ParamInfo, ParamKind, Params, Slots, TechniqueError, views};
+use crate::{lights::{bvh::{LightBvh, self}, cells::{CellLists, Division, Grid, VisibleDepths, self}, pixel_lists::{LightLists, self}}, surfaces::depth_first::{draw_depth, shade_visible}};
 
 /// Lights up to which a loop over all of them costs less than any structure, by `auto`.
 const FEW_LIGHTS: u32 = 16;
 
 /// Name of the parameter.
-pub(crate) const KEY: &str = "lights";
-
-/// Parameters that every technique with [`KEY`] has as well.
-pub(crate) const CELLS: &[ParamInfo] =
-    &[clusters::TILE_PX, clusters::CLUSTER_PX, clusters::SLICES, clusters::SLICING];
+pub const KEY: &str = "lights";
 
 /// Which lights a surface visits, for sources of several surfaces a pixel.
 pub const LIGHTS: ParamInfo = ParamInfo {
@@ -57,7 +46,7 @@ pub enum LightStep {
 
 /// How cells divide the view for a value of `lights`, by the technique's parameters of them or their defaults.
 fn division(value: &str, params: &Params) -> Option<Division> {
-    let tile_px = params.count(&clusters::TILE_PX);
+    let tile_px = params.count(&afterlight_frame::params::TILE_PX);
     Some(match value {
         "tiles" => Division::Tiles { tile_px },
         "tiles25" => Division::Tiles25d { tile_px },
@@ -69,9 +58,9 @@ fn division(value: &str, params: &Params) -> Option<Division> {
 /// The value of `lights` of a frame's technique, `auto` resolved.
 ///
 /// The view of cells shows clusters where the technique would have none.
-pub(crate) fn chosen<'a>(frame: &'a Frame<'_>, info: &'a Info) -> &'a str {
+pub fn chosen<'a>(frame: &'a Frame<'_>, info: &'a Info) -> &'a str {
     match frame.params.text(info, KEY) {
-        value if frame.shows(view::CLUSTERS) && !value.starts_with("tiles") => "clusters",
+        value if frame.shows(views::CLUSTERS) && !value.starts_with("tiles") => "clusters",
         "auto" if frame.lights.count <= FEW_LIGHTS => "all",
         "auto" => "clusters",
         value => value,
@@ -82,20 +71,20 @@ impl LightStep {
     /// Builds what the technique's `lights` asks for, from where the surfaces of the image stand.
     ///
     /// # Errors
-    /// As [`clusters::build`].
+    /// As [`cells::build`].
     pub fn build(
         graph: &mut Graph,
         frame: &Frame<'_>,
         info: &Info,
-        surfaces: &Surfaces<'_>,
+        surfaces: &VisibleDepths<'_>,
     ) -> Result<Self, TechniqueError> {
         let value = chosen(frame, info);
         if let Some(division) = division(value, frame.params) {
-            return Ok(Self::Cells(clusters::build(graph, frame, info.id, division, surfaces)?));
+            return Ok(Self::Cells(cells::build(graph, frame, info.id, division, surfaces)?));
         }
         Ok(match value {
-            "lists" => Self::Lists(light_lists::build(graph, frame, info, surfaces, None)?),
-            "tree" => Self::Tree(light_bvh::build(graph, frame, info.id)?),
+            "lists" => Self::Lists(pixel_lists::build(graph, frame, info, surfaces, None)?),
+            "tree" => Self::Tree(bvh::build(graph, frame, info.id)?),
             "volumes" => Self::None,
             _ => Self::All,
         })
@@ -105,26 +94,26 @@ impl LightStep {
     ///
     /// # Errors
     /// A shader that is not compiled in.
-    pub(crate) fn anywhere(graph: &mut Graph, frame: &Frame<'_>, user: &str) -> Result<Self, TechniqueError> {
+    pub fn anywhere(graph: &mut Graph, frame: &Frame<'_>, user: &str) -> Result<Self, TechniqueError> {
         match frame.lights.count <= FEW_LIGHTS {
             true => Ok(Self::All),
-            false => Ok(Self::Tree(light_bvh::build(graph, frame, user)?)),
+            false => Ok(Self::Tree(bvh::build(graph, frame, user)?)),
         }
     }
 
     /// Builds lists of lights a pixel over a depth buffer of the frame's samples.
     ///
     /// # Errors
-    /// As [`light_lists::build`].
+    /// As [`pixel_lists::build`].
     pub fn lists(
         graph: &mut Graph,
         frame: &Frame<'_>,
         info: &Info,
         depth: &ImageHandle,
     ) -> Result<Self, TechniqueError> {
-        let surfaces = Surfaces::of_depth(depth, frame.samples);
+        let surfaces = VisibleDepths::of_depth(depth, frame.samples);
         let tested = (frame.samples == 1).then_some(depth);
-        Ok(Self::Lists(light_lists::build(graph, frame, info, &surfaces, tested)?))
+        Ok(Self::Lists(pixel_lists::build(graph, frame, info, &surfaces, tested)?))
     }
 
     /// Binds what `radiance.glsl` reads. What the step does not have is read by no one, yet its slots are there: resources of the same
@@ -168,35 +157,3 @@ impl LightStep {
     }
 }
 
-/// Declares the pass `technique/shade`: forward shading where depth, which [`crate::depth_prepass`] has drawn, is equal. Returns
-/// radiance, the samples of a pixel averaged.
-///
-/// # Errors
-/// A shader that is not compiled in.
-pub(crate) fn shade_forward(
-    graph: &mut Graph,
-    frame: &Frame<'_>,
-    technique: &str,
-    depth: ImageHandle,
-    step: &LightStep,
-) -> Result<ImageHandle, TechniqueError> {
-    let shader = (technique, "light_step/forward.frag");
-    shade_visible(graph, frame, shader, depth, step.constants(), |pass| step.bind(frame, pass))
-}
-
-/// A depth pre-pass, lists of lights of the cells that it shows, and forward shading by them.
-///
-/// # Errors
-/// As [`clusters::build`].
-pub(crate) fn record_forward(
-    graph: &mut Graph,
-    frame: &Frame<'_>,
-    info: &Info,
-    division: Division,
-) -> Result<ImageHandle, TechniqueError> {
-    let depth = draw_depth(graph, frame, info.id)?;
-    let surfaces = Surfaces::of_depth(&depth, frame.samples);
-    let lists = clusters::build(graph, frame, info.id, division, &surfaces)?;
-    drop(surfaces);
-    shade_forward(graph, frame, info.id, depth, &LightStep::Cells(lists))
-}

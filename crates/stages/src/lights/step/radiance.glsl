@@ -1,8 +1,8 @@
 // Which lights a surface visits, whatever holds the surface: one code for every technique that shades a surface at once.
 #ifndef AFTERLIGHT_LIGHT_STEP
 #define AFTERLIGHT_LIGHT_STEP
-#include "clusters/lists.glsl"
-#include "light_lists/lists.glsl"
+#include "lights/cells/cell_lists.glsl"
+#include "lights/pixel_lists/pixel_lists.glsl"
 
 // light_step/mod.rs
 const uint STEP_ALL = 0u;       // all

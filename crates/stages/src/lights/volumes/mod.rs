@@ -9,7 +9,7 @@ use afterlight_graph::{
 };
 use glam::Vec3;
 
-use crate::{error::TechniqueError, frame::Frame};
+use afterlight_frame::{Frame, TechniqueError};
 
 /// Depth test of a volume's back faces: they pass where they lie behind the surface.
 pub const BEHIND_SURFACE: DepthTest = DepthTest { compare: vk::CompareOp::LESS_OR_EQUAL, write: false };
@@ -97,7 +97,7 @@ pub fn volume_state(
     cull: vk::CullModeFlags,
     blend: Vec<Blend>,
 ) -> Result<RasterState, TechniqueError> {
-    state(frame, "volumes/volume.vert", fragment, cull, blend).map(|s| s.layout(layout()))
+    state(frame, "lights/volumes/volume.vert", fragment, cull, blend).map(|s| s.layout(layout()))
 }
 
 /// As [`volume_state`], with a table of lights, the slot `LightOrder`, whose places are the instances.
@@ -110,7 +110,7 @@ pub fn ordered_state(
     cull: vk::CullModeFlags,
     blend: Vec<Blend>,
 ) -> Result<RasterState, TechniqueError> {
-    state(frame, "volumes/volume.vert#ordered", Some(fragment), cull, blend).map(|s| s.layout(layout()))
+    state(frame, "lights/volumes/volume.vert#ordered", Some(fragment), cull, blend).map(|s| s.layout(layout()))
 }
 
 fn state(
@@ -162,7 +162,7 @@ pub fn draw_all(
 ///
 /// # Errors
 /// A shader that is not compiled in.
-pub(crate) fn draw_all_by(
+pub fn draw_all_by(
     frame: &Frame<'_>,
     pass: &mut RasterPass<'_>,
     fragment: &str,
@@ -212,7 +212,7 @@ fn draw_unbounded_by(
     if frame.lights.unbounded_count > 0 {
         let mut state = state(
             frame,
-            "volumes/volume.vert#full-screen",
+            "lights/volumes/volume.vert#full-screen",
             Some(fragment),
             vk::CullModeFlags::NONE,
             vec![Blend::ADD; targets],

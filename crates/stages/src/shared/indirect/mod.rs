@@ -8,7 +8,8 @@ use std::f32::consts::{PI, TAU};
 use afterlight_graph::{BufferHandle, Graph, ImageHandle, ImageInfo, Load, gpu::vk};
 use afterlight_shader::structs::RsmConstants;
 
-use crate::{SceneGpu, Settings, error::TechniqueError, frame::Frame, geometry::Surfaces, light_view};
+use afterlight_frame::{Indirect, SceneInput, Slots, Frame, SceneGpu, Settings, TechniqueError};
+use crate::{shared::light_view, surfaces::geometry::SceneDraws};
 
 /// Texels that a surface gathers from.
 pub const SAMPLES: usize = 64;
@@ -16,58 +17,49 @@ pub const SAMPLES: usize = 64;
 /// Radius of the disc of the map that they are taken from, as a share of its width.
 pub const RADIUS: f32 = 0.3;
 
-/// Width and height of the reflective shadow map where none is given, texels.
-pub const DEFAULT_MAP_SIZE_PX: u32 = 512;
-
-/// Light that surfaces reflect onto each other.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum Indirect {
-    /// None but the constant ambient term.
-    #[default]
-    None,
-    /// One bounce of one light, by a reflective shadow map.
-    Rsm,
-}
-
-impl Indirect {
-    /// Name on the command line and in run records.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Indirect::None => "none",
-            Indirect::Rsm => "rsm",
-        }
-    }
-}
-
 /// What indirect light is gathered from, as the graph knows it.
-pub(crate) struct Rsm {
+pub struct Rsm {
     pub constants: BufferHandle,
     /// None where there is no indirect light.
     pub images: Option<RsmImages>,
 }
 
 /// The light's view.
-pub(crate) struct RsmImages {
+pub struct RsmImages {
     pub surface: ImageHandle,
     pub flux: ImageHandle,
 }
 
-impl Rsm {
-    /// `INDIRECT_SAMPLES` of shaders.
-    pub fn sample_count(&self) -> u32 {
-        self.images.as_ref().map_or(0, |_| SAMPLES as u32)
+/// Says that surfaces of this frame gather indirect light.
+pub struct IndirectLight {
+    /// Texels that each gathers from.
+    pub sample_count: u32,
+}
+
+impl SceneInput for Rsm {
+    fn bind(&self, frame: &Frame<'_>, pass: &mut dyn Slots) {
+        pass.read_buffer("RsmBlock", &self.constants);
+        // Without indirect light the compiler removes the code that reads the images but keeps their bindings: images of the same
+        // kinds fill them.
+        let b = &frame.buffers;
+        pass.read_image("rsm_surface", self.images.as_ref().map_or(&b.materials, |i| &i.surface));
+        pass.read_image("rsm_flux", self.images.as_ref().map_or(&b.light_spheres, |i| &i.flux));
+    }
+
+    fn constants(&self) -> Vec<(&'static str, u32)> {
+        vec![("INDIRECT_SAMPLES", self.images.as_ref().map_or(0, |_| SAMPLES as u32))]
     }
 }
 
 /// Why there is no indirect light though it was asked for.
-pub(crate) fn warning(settings: &Settings, scene: &SceneGpu) -> Option<String> {
+pub fn warning(settings: &Settings, scene: &SceneGpu) -> Option<String> {
     (settings.indirect == Indirect::Rsm && light_view::source(scene, settings).is_none())
         .then(|| "no indirect light: the scene has no light, or no surface, to take it from".to_owned())
 }
 
 /// The pattern of all pixels (section 4.1): Hammersley points (ξ1, ξ2) at radius ξ1 and angle 2π ξ2, weighted by ξ1², the weights
 /// normalised so that the samples stand for the disc. Offset in shares of the map, area in shares of the map's.
-pub(crate) fn pattern() -> [[f32; 3]; SAMPLES] {
+pub fn pattern() -> [[f32; 3]; SAMPLES] {
     let points: [[f32; 2]; SAMPLES] = std::array::from_fn(|i| {
         // ξ1 in the middle of its stratum: a sample at the very centre would have no weight.
         let xi1 = (i as f32 + 0.5) / SAMPLES as f32;
@@ -84,7 +76,7 @@ pub(crate) fn pattern() -> [[f32; 3]; SAMPLES] {
 ///
 /// # Errors
 /// A shader that is not compiled in, the device.
-pub(crate) fn record(
+pub fn record(
     graph: &mut Graph,
     frame: &mut Frame<'_>,
     settings: &Settings,
@@ -109,7 +101,10 @@ pub(crate) fn record(
     };
     let buffer = light_view::upload(frame.device, "shared/rsm constants", &constants)?;
     let constants = graph.import_buffer("shared/rsm constants", &buffer);
-    frame.buffers.rsm = Some(Rsm { constants, images });
+    if images.is_some() {
+        frame.board.put(IndirectLight { sample_count: SAMPLES as u32 });
+    }
+    frame.board.add_input(Rsm { constants, images });
     Ok(())
 }
 
@@ -126,7 +121,7 @@ fn raster(
     let surface = image(graph, "surface", vk::Format::R32G32B32A32_UINT);
     let flux = image(graph, "flux", vk::Format::R16G16B16A16_SFLOAT);
     let depth = image(graph, "depth", vk::Format::D32_SFLOAT);
-    let mut surfaces = Surfaces::shaded(frame, "indirect/rsm.frag", "indirect/rsm.frag#mask")?;
+    let mut surfaces = SceneDraws::shaded(frame, "shared/indirect/rsm.frag", "shared/indirect/rsm.frag#mask")?;
     surfaces.push = light_index.to_le_bytes().to_vec();
     let mut pass = graph.raster("shared/rsm");
     frame.bind_scene(&mut pass);

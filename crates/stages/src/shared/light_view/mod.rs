@@ -10,13 +10,7 @@ use afterlight_graph::{
 use afterlight_scene::{Aabb, Camera, Light, LightKind, Projection};
 use glam::{Mat4, Vec3};
 
-use crate::{
-    SceneGpu, Settings,
-    draw_list::{DrawList, DrawOptions},
-    error::TechniqueError,
-    frame::Frame,
-    renderer::View,
-};
+use afterlight_frame::{CameraView, Frame, SceneGpu, Settings, TechniqueError, scene::draw_list::{DrawList, DrawOptions}};
 
 /// Widest angle of a light's perspective view, radians: further out a texel has hardly any solid angle.
 const WIDEST_RAD: f32 = 150.0 / 180.0 * PI;
@@ -102,7 +96,7 @@ fn perspective_view(light: &Light, target_ws: Vec3, angle_rad: f32, bounds_ws: &
 }
 
 /// The light of a scene's settings, and its view; `None` without a light or a surface. Displaced surfaces are in view too.
-pub(crate) fn source(scene: &SceneGpu, settings: &Settings) -> Option<SourceView> {
+pub fn source(scene: &SceneGpu, settings: &Settings) -> Option<SourceView> {
     SourceView::choose(&settings.lights, &scene.bounds_ws(settings.displacement_m))
 }
 
@@ -110,7 +104,7 @@ pub(crate) fn source(scene: &SceneGpu, settings: &Settings) -> Option<SourceView
 ///
 /// # Errors
 /// The device.
-pub(crate) fn upload<T: bytemuck::NoUninit>(
+pub fn upload<T: bytemuck::NoUninit>(
     device: &gpu::Device,
     name: &str,
     data: &T,
@@ -130,7 +124,7 @@ pub(crate) fn upload<T: bytemuck::NoUninit>(
 ///
 /// # Errors
 /// Those of `declare`, the device.
-pub(crate) fn look_through<T>(
+pub fn look_through<T>(
     graph: &mut Graph,
     frame: &mut Frame<'_>,
     settings: &Settings,
@@ -140,7 +134,7 @@ pub(crate) fn look_through<T>(
 ) -> Result<T, TechniqueError> {
     let settings =
         Settings { camera: source.camera.clone(), width_px: size_px, height_px: size_px, ..settings.clone() };
-    let view = View::new(&settings);
+    let view = CameraView::new(&settings);
     let mut draws = DrawList::new(frame.device, frame.scene, DrawOptions::default())?;
     draws.update(frame.scene, view.clip_from_world, view.eye_ws, settings.displacement_m)?;
     let name = format!("{pass} view");

@@ -8,16 +8,8 @@ use afterlight_scene::Projection;
 use afterlight_shader::structs::ShadowConstants;
 use glam::{Mat4, Vec3};
 
-use crate::{
-    SceneGpu, Settings,
-    error::TechniqueError,
-    frame::Frame,
-    geometry::Surfaces,
-    light_view::{self, SourceView},
-};
-
-/// Width and height of the shadow map where none is given, texels.
-pub const DEFAULT_MAP_SIZE_PX: u32 = 2048;
+use afterlight_frame::{Shadows, SceneInput, Slots, Frame, SceneGpu, Settings, TechniqueError};
+use crate::{shared::light_view::{SourceView, self}, surfaces::geometry::SceneDraws};
 
 /// How far from a point the filter reads along each axis, at most, texels: it covers a texel to each side of the point, and the
 /// centre of a texel is half a texel from where it begins.
@@ -27,35 +19,27 @@ pub const FILTER_REACH_TEXELS: f32 = 1.5;
 /// which is far less.
 const NEARER_TEXELS: f32 = 0.5;
 
-/// Shadows of direct light.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum Shadows {
-    /// None: light passes through surfaces.
-    #[default]
-    None,
-    /// Of one light, by a shadow map.
-    Map,
-}
-
-impl Shadows {
-    /// Name on the command line and in run records.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Shadows::None => "none",
-            Shadows::Map => "map",
-        }
-    }
-}
-
 /// What tells whether a light reaches a point, as the graph knows it.
-pub(crate) struct Shadow {
+pub struct Shadow {
     pub constants: BufferHandle,
     /// None where there are no shadows.
     pub map: Option<ImageHandle>,
 }
 
+impl SceneInput for Shadow {
+    fn bind(&self, frame: &Frame<'_>, pass: &mut dyn Slots) {
+        pass.read_buffer("ShadowBlock", &self.constants);
+        // Not read without shadows; bound because the layout requires it.
+        pass.read_image("shadow_map", self.map.as_ref().unwrap_or(&frame.buffers.light_spheres));
+    }
+
+    fn constants(&self) -> Vec<(&'static str, u32)> {
+        vec![("SHADOWS", u32::from(self.map.is_some()))]
+    }
+}
+
 /// Why there are no shadows though they were asked for.
-pub(crate) fn warning(settings: &Settings, scene: &SceneGpu) -> Option<String> {
+pub fn warning(settings: &Settings, scene: &SceneGpu) -> Option<String> {
     (settings.shadows == Shadows::Map && light_view::source(scene, settings).is_none())
         .then(|| "no shadows: the scene has no light, or no surface, to cast them".to_owned())
 }
@@ -64,7 +48,7 @@ pub(crate) fn warning(settings: &Settings, scene: &SceneGpu) -> Option<String> {
 ///
 /// # Errors
 /// A shader that is not compiled in, the device.
-pub(crate) fn record(
+pub fn record(
     graph: &mut Graph,
     frame: &mut Frame<'_>,
     settings: &Settings,
@@ -92,7 +76,7 @@ pub(crate) fn record(
     };
     let buffer = light_view::upload(frame.device, "shared/shadow constants", &constants)?;
     let constants = graph.import_buffer("shared/shadow constants", &buffer);
-    frame.buffers.shadow = Some(Shadow { constants, map });
+    frame.board.add_input(Shadow { constants, map });
     Ok(())
 }
 
@@ -124,7 +108,7 @@ fn raster(
 ) -> Result<ImageHandle, TechniqueError> {
     let info = ImageInfo::new(vk::Format::D32_SFLOAT, size_px, size_px);
     let map = graph.image("shared/shadow depth", info);
-    let mut surfaces = Surfaces::depth_only(frame)?;
+    let mut surfaces = SceneDraws::depth_only(frame)?;
     // Less is farther.
     surfaces.depth_bias_slope = -2.0 * FILTER_REACH_TEXELS * bias;
     Ok(surfaces.fill_depth(graph, frame, "shared/shadow", map))

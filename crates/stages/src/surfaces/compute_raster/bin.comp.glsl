@@ -3,8 +3,8 @@
 // In: LargeTriangles, LargeCount. Out: TileJobs, JobCount. Dispatch: any number of groups.
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#include "compute_raster/raster.glsl"
-#include "compute_raster/tile_jobs.glsl"
+#include "surfaces/compute_raster/raster.glsl"
+#include "surfaces/compute_raster/tile_jobs.glsl"
 
 layout(local_size_x = 64) in;
 layout(set = 0, binding = 10, scalar) readonly buffer LargeTriangles {

@@ -3,8 +3,8 @@
 // In: TileJobs, JobCount. Out: SampleKeys. Dispatch: any number of groups.
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#include "compute_raster/raster.glsl"
-#include "compute_raster/tile_jobs.glsl"
+#include "surfaces/compute_raster/raster.glsl"
+#include "surfaces/compute_raster/tile_jobs.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(set = 0, binding = 10, scalar) readonly buffer TileJobs {

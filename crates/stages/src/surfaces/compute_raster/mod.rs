@@ -6,13 +6,7 @@
 
 use afterlight_graph::{BufferHandle, Graph};
 
-use crate::{
-    Info,
-    error::TechniqueError,
-    frame::Frame,
-    params::{ParamInfo, ParamKind},
-    scene_gpu::{BUCKETS, DRAW_TRIANGLES},
-};
+use afterlight_frame::{Frame, Info, TechniqueError, params::{ParamInfo, ParamKind}, scene::{BUCKETS, DRAW_TRIANGLES}};
 
 /// Large triangles that the first frame has room for.
 const FIRST_LARGE: u32 = 1 << 16;
@@ -94,7 +88,7 @@ pub fn rasterize(
     let has_masked = frame.scene.has_masked();
     let variant = |shader: &str| if has_masked { format!("{shader}#mask") } else { shader.to_owned() };
     // One pass for opaque and masked surfaces: a few slow threads of alpha tests then have company.
-    let shader = frame.shader(&variant("compute_raster/triangles.comp"))?;
+    let shader = frame.shader(&variant("surfaces/compute_raster/triangles.comp"))?;
     let mut pass = frame.compute(graph, &name("triangles"), &shader);
     pass.constant("SAMPLES", samples)
         .constant("LARGE_CAPACITY", large_capacity)
@@ -115,7 +109,7 @@ pub fn rasterize(
     }
     pass.finish();
 
-    let mut pass = frame.compute(graph, &name("bin"), &frame.shader("compute_raster/bin.comp")?);
+    let mut pass = frame.compute(graph, &name("bin"), &frame.shader("surfaces/compute_raster/bin.comp")?);
     pass.constant("LARGE_CAPACITY", large_capacity).constant("JOB_CAPACITY", job_capacity);
     pass.read("DrawCommands", &frame.buffers.commands);
     pass.read("LargeTriangles", &large).read("LargeCount", &large_count);
@@ -124,7 +118,7 @@ pub fn rasterize(
     pass.dispatch([LIST_GROUPS, 1, 1]);
     pass.finish();
 
-    let shader = frame.shader(&variant("compute_raster/large.comp"))?;
+    let shader = frame.shader(&variant("surfaces/compute_raster/large.comp"))?;
     let mut pass = frame.compute(graph, &name("large triangles"), &shader);
     pass.constant("SAMPLES", samples).constant("JOB_CAPACITY", job_capacity);
     pass.read("DrawCommands", &frame.buffers.commands).read("TileJobs", &jobs).read("JobCount", &job_count);

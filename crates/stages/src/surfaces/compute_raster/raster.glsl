@@ -10,7 +10,7 @@
 #define EXPLICIT_GRADIENTS
 #include "frame.glsl"
 #include "triangle.glsl"
-#include "multisample/samples.glsl"
+#include "surfaces/visible/samples.glsl"
 
 // One a sample, those of a pixel side by side.
 layout(set = 0, binding = 8, scalar) buffer SampleKeys {

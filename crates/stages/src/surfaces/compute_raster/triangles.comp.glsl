@@ -4,7 +4,7 @@
 // x 8. ALPHA_MASK tests alpha where a material has a cutoff.
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#include "compute_raster/raster.glsl"
+#include "surfaces/compute_raster/raster.glsl"
 
 layout(local_size_x = 128) in;
 layout(set = 0, binding = 10, scalar) readonly buffer DrawCounts {

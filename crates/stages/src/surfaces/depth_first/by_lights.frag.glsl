@@ -1,5 +1,5 @@
 // Forward shading where every surface visits the lights that light_step/ finds for it (Petrescu et al. 2016, sections 4.7 to 4.10).
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#include "light_step/radiance.glsl"
-#include "depth_prepass/shade_visible.glsl"
+#include "lights/step/radiance.glsl"
+#include "surfaces/depth_first/shade_visible.glsl"

@@ -12,12 +12,8 @@
 
 use afterlight_graph::{ComputePass, Graph, ImageHandle, Load, RasterPass, gpu::vk};
 
-use crate::{
-    error::TechniqueError,
-    frame::{Frame, Slots},
-    geometry::Surfaces,
-    light_step::LightStep,
-};
+use afterlight_frame::{OpaqueDepth, Frame, Slots, TechniqueError};
+use crate::{lights::step::LightStep, surfaces::geometry::SceneDraws};
 
 /// Handles of a filled G-buffer.
 pub struct GBuffer {
@@ -43,12 +39,12 @@ pub fn fill(
     technique: &str,
     depth_format: vk::Format,
 ) -> Result<GBuffer, TechniqueError> {
-    let surfaces = Surfaces::shaded(frame, "gbuffer/gbuffer.frag", "gbuffer/gbuffer.frag#mask")?;
+    let surfaces = SceneDraws::shaded(frame, "surfaces/gbuffer/gbuffer.frag", "surfaces/gbuffer/gbuffer.frag#mask")?;
     Ok(fill_by(graph, frame, technique, depth_format, |pass| surfaces.draw(frame, pass)))
 }
 
 /// Declares the pass `technique/gbuffer` with other draws than those of all surfaces.
-pub(crate) fn fill_by(
+pub fn fill_by(
     graph: &mut Graph,
     frame: &Frame<'_>,
     technique: &str,
@@ -98,7 +94,7 @@ pub fn shade(
     filled: GBuffer,
     step: &LightStep,
 ) -> Result<ImageHandle, TechniqueError> {
-    shade_by(graph, frame, (technique, "gbuffer/shade.comp"), filled, |pass| {
+    shade_by(graph, frame, (technique, "surfaces/gbuffer/shade.comp"), filled, |pass| {
         step.bind(frame, pass);
         for (constant, value) in step.constants() {
             pass.constant(&constant, value);
@@ -110,7 +106,7 @@ pub fn shade(
 ///
 /// # Errors
 /// A shader that is not compiled in.
-pub(crate) fn shade_by(
+pub fn shade_by(
     graph: &mut Graph,
     frame: &Frame<'_>,
     (technique, shader): (&str, &str),
@@ -123,6 +119,6 @@ pub(crate) fn shade_by(
     let radiance = pass.write("hdr", filled.accumulation);
     pass.dispatch(frame.groups(8));
     pass.finish();
-    frame.hand_over_depth(filled.depth);
+    frame.board.put(OpaqueDepth(filled.depth));
     Ok(radiance)
 }

@@ -2,5 +2,5 @@
 // In: what light_step/radiance.glsl reads, and as below.
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#include "light_step/radiance.glsl"
-#include "gbuffer/shade_pixels.glsl"
+#include "lights/step/radiance.glsl"
+#include "surfaces/gbuffer/shade_pixels.glsl"

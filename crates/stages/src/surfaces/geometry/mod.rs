@@ -13,19 +13,7 @@ use afterlight_graph::{
 use afterlight_graph::{VertexAttribute, VertexLayout, VertexStream};
 use afterlight_shader::Shader;
 
-use crate::{
-    draw_list::COMMAND_BYTES,
-    error::TechniqueError,
-    frame::Frame,
-    scene_gpu::{BUCKETS, Bucket},
-};
-
-/// Shortest edge that tessellation aims at, pixels.
-pub const MIN_TESSELLATE_PX: f32 = 1.0;
-/// Longest edge that tessellation aims at, pixels.
-pub const MAX_TESSELLATE_PX: f32 = 64.0;
-/// Farthest displacement along each axis, m: beyond an eighth of the field's period the surface would fold.
-pub const MAX_DISPLACEMENT_M: f32 = 0.1;
+use afterlight_frame::{MIN_TESSELLATE_PX, Frame, TechniqueError, scene::{BUCKETS, Bucket, draw_list::COMMAND_BYTES}};
 
 /// Shaders of one kind of surface.
 pub struct SurfaceShaders {
@@ -51,8 +39,8 @@ impl SurfaceShaders {
         }
         let evaluation = frame.shader(&vertex.replacen(".vert", ".tese", 1))?;
         Ok(Self {
-            vertex: frame.shader("geometry/surface.vert#tessellation")?,
-            tessellation: Some((frame.shader("geometry/surface.tesc")?, evaluation)),
+            vertex: frame.shader("surfaces/geometry/surface.vert#tessellation")?,
+            tessellation: Some((frame.shader("surfaces/geometry/surface.tesc")?, evaluation)),
             geometry: None,
             fragment,
         })
@@ -60,7 +48,7 @@ impl SurfaceShaders {
 }
 
 /// How the scene is drawn in a pass.
-pub struct Surfaces {
+pub struct SceneDraws {
     /// For opaque surfaces.
     pub opaque: SurfaceShaders,
     /// For alpha-masked surfaces.
@@ -85,13 +73,13 @@ pub struct Surfaces {
     pub scissor: Option<Rect>,
 }
 
-impl Surfaces {
+impl SceneDraws {
     /// The full vertex path with a fragment shader `name` and its `name#mask` variant, nearest surface kept.
     ///
     /// # Errors
     /// A name that is not compiled in.
     pub fn shaded(frame: &Frame<'_>, opaque: &str, masked: &str) -> Result<Self, TechniqueError> {
-        Self::new(frame, ("geometry/surface.vert", Some(opaque)), ("geometry/surface.vert", masked))
+        Self::new(frame, ("surfaces/geometry/surface.vert", Some(opaque)), ("surfaces/geometry/surface.vert", masked))
     }
 
     /// Depth alone: no fragment shader for opaque surfaces, the alpha test for masked ones.
@@ -101,8 +89,8 @@ impl Surfaces {
     pub fn depth_only(frame: &Frame<'_>) -> Result<Self, TechniqueError> {
         Self::new(
             frame,
-            ("geometry/surface.vert#position", None),
-            ("geometry/surface.vert#uv", "geometry/alpha.frag"),
+            ("surfaces/geometry/surface.vert#position", None),
+            ("surfaces/geometry/surface.vert#uv", "surfaces/geometry/alpha.frag"),
         )
     }
 
@@ -137,7 +125,7 @@ impl Surfaces {
     /// A device that counts in no geometry shader.
     pub fn numbered(mut self, frame: &Frame<'_>, technique: &'static str) -> Result<Self, TechniqueError> {
         check_numbering(frame, technique)?;
-        let shader = frame.shader("geometry/number.geom")?;
+        let shader = frame.shader("surfaces/geometry/number.geom")?;
         (self.opaque.geometry, self.masked.geometry) = (Some(shader.clone()), Some(shader));
         Ok(self)
     }
@@ -152,7 +140,7 @@ impl Surfaces {
         technique: &'static str,
     ) -> Result<Self, TechniqueError> {
         check_numbering(frame, technique)?;
-        let shader = frame.shader("geometry/number.geom#whole")?;
+        let shader = frame.shader("surfaces/geometry/number.geom#whole")?;
         (self.opaque.geometry, self.masked.geometry) = (Some(shader.clone()), Some(shader));
         Ok(self)
     }
@@ -163,8 +151,8 @@ impl Surfaces {
     /// # Errors
     /// A shader that is not compiled in.
     pub fn through_geometry(mut self, frame: &Frame<'_>) -> Result<Self, TechniqueError> {
-        self.opaque.geometry = Some(frame.shader("geometry/pass.geom#position")?);
-        self.masked.geometry = Some(frame.shader("geometry/pass.geom#uv")?);
+        self.opaque.geometry = Some(frame.shader("surfaces/geometry/pass.geom#position")?);
+        self.masked.geometry = Some(frame.shader("surfaces/geometry/pass.geom#uv")?);
         Ok(self)
     }
 
@@ -208,7 +196,7 @@ impl Surfaces {
 
     /// Adds some of the draws in view to a pass: a bucket's, by their places in its order. Word `word` of `counts` is their number:
     /// lavapipe (Mesa 22.3) gives an indirect call without a count the count of the call before.
-    pub(crate) fn draw_some(
+    pub fn draw_some(
         &self,
         frame: &Frame<'_>,
         pass: &mut RasterPass<'_>,
@@ -228,7 +216,7 @@ impl Surfaces {
     }
 
     /// Declares the pass `name` that clears a depth image, and its stencil where it has one, and draws the surfaces into it.
-    pub(crate) fn fill_depth(
+    pub fn fill_depth(
         &self,
         graph: &mut Graph,
         frame: &Frame<'_>,
@@ -247,7 +235,7 @@ impl Surfaces {
     }
 
     /// A draw of surfaces of one bucket by any call whose first instances are draw numbers.
-    pub(crate) fn bucket_draw<'a>(
+    pub fn bucket_draw<'a>(
         &self,
         frame: &'a Frame<'_>,
         bucket: Bucket,

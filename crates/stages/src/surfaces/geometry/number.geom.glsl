@@ -8,9 +8,9 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #ifdef WHOLE_TRIANGLE
-#include "triangle_buffer/vertices.glsl"
+#include "surfaces/triangles/vertices.glsl"
 #define THROUGH out
-#include "geometry/whole_triangle.glsl"
+#include "surfaces/geometry/whole_triangle.glsl"
 #endif
 
 layout(triangles) in;

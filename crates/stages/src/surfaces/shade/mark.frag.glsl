@@ -3,8 +3,8 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "frame.glsl"
-#include "multisample/samples.glsl"
-#include "multisample/edge_mark.glsl"
+#include "surfaces/visible/samples.glsl"
+#include "surfaces/shade/edge_mark.glsl"
 
 void main() {
     if (!is_edge(ivec2(gl_FragCoord.xy))) {

@@ -8,31 +8,17 @@
 //!
 //! Scenes with emissive surfaces take four bytes more.
 
-mod visible;
-
-pub use visible::Visible;
-
 use afterlight_graph::{BufferHandle, Graph, ImageHandle, Load, RasterPass, gpu::vk};
 
-use crate::{
-    Info, clusters,
-    error::TechniqueError,
-    frame::{Frame, Slots, SourceSlots},
-    geometry::Surfaces,
-    light_step::LightStep,
-    technique::Need,
-    view, volumes,
-};
+use afterlight_frame::{Frame, Info, Need, Slots, SourceSlots, TechniqueError, views};
+use crate::{lights::{cells, step::LightStep, volumes}, surfaces::{geometry::SceneDraws, visible::NO_TRIANGLE_RGBA8}};
 
 /// Positions are reconstructed where the samples stand.
 pub const STANDARD_LOCATIONS: Need =
     Need { name: "standard sample locations", test: |features| features.standard_sample_locations };
 
 /// Views of techniques that end in [`shade`].
-pub const VIEWS: &[&str] = &[view::SAMPLE_USAGE, view::INVOCATIONS, view::EDGES, view::WEIGHTS];
-
-/// What a pixel without a surface holds in an image of triangle IDs: `NO_TRIANGLE`, all ones.
-pub(crate) const NO_TRIANGLE_RGBA8: [f32; 4] = [1.0; 4];
+pub const VIEWS: &[&str] = &[views::SAMPLE_USAGE, views::INVOCATIONS, views::EDGES, views::WEIGHTS];
 
 /// A multisampled G-buffer: the depth, and other images with the names of their slots.
 pub struct SampleBuffer {
@@ -44,8 +30,8 @@ pub struct SampleBuffer {
 
 impl SampleBuffer {
     /// Where its surfaces stand.
-    pub fn surfaces(&self, frame: &Frame<'_>) -> clusters::Surfaces<'_> {
-        clusters::Surfaces::of_depth(&self.depth, frame.samples)
+    pub fn surfaces(&self, frame: &Frame<'_>) -> cells::VisibleDepths<'_> {
+        cells::VisibleDepths::of_depth(&self.depth, frame.samples)
     }
 
     /// Binds what a source of surfaces reads.
@@ -58,7 +44,7 @@ impl SampleBuffer {
 }
 
 /// Name of a shader's variant for the scene: with emission where a surface emits.
-pub(crate) fn emission_variant(frame: &Frame<'_>, name: &str) -> String {
+pub fn emission_variant(frame: &Frame<'_>, name: &str) -> String {
     let tag = if name.contains('#') { "-emission" } else { "#emission" };
     if frame.scene.has_emission { format!("{name}{tag}") } else { name.to_owned() }
 }
@@ -72,10 +58,10 @@ pub fn fill_samples(
     frame: &Frame<'_>,
     technique: &str,
 ) -> Result<SampleBuffer, TechniqueError> {
-    let surfaces = Surfaces::new(
+    let surfaces = SceneDraws::new(
         frame,
-        ("geometry/surface.vert#centroid", Some(&emission_variant(frame, "multisample/samples.frag"))),
-        ("geometry/surface.vert#centroid", &emission_variant(frame, "multisample/samples.frag#mask")),
+        ("surfaces/geometry/surface.vert#centroid", Some(&emission_variant(frame, "surfaces/shade/samples.frag"))),
+        ("surfaces/geometry/surface.vert#centroid", &emission_variant(frame, "surfaces/shade/samples.frag#mask")),
     )?;
     let images = [
         ("gbuffer_base_color", vk::Format::R8G8B8A8_SRGB, Load::DontCare),
@@ -97,11 +83,11 @@ pub fn fill_dedup(
 ) -> Result<SampleBuffer, TechniqueError> {
     let numbered = frame.tessellate_px.is_some();
     let [opaque, masked] = match numbered {
-        false => ["multisample/dedup.frag", "multisample/dedup.frag#mask"],
-        true => ["multisample/dedup.frag#numbered", "multisample/dedup.frag#mask-numbered"],
+        false => ["surfaces/shade/dedup.frag", "surfaces/shade/dedup.frag#mask"],
+        true => ["surfaces/shade/dedup.frag#numbered", "surfaces/shade/dedup.frag#mask-numbered"],
     };
     let mut surfaces =
-        Surfaces::shaded(frame, &emission_variant(frame, opaque), &emission_variant(frame, masked))?;
+        SceneDraws::shaded(frame, &emission_variant(frame, opaque), &emission_variant(frame, masked))?;
     let mut count = None;
     if numbered {
         surfaces = surfaces.numbered(frame, technique)?;
@@ -121,7 +107,7 @@ fn fill(
     graph: &mut Graph,
     frame: &Frame<'_>,
     technique: &str,
-    surfaces: &Surfaces,
+    surfaces: &SceneDraws,
     images: &[(&'static str, vk::Format, Load<[f32; 4]>)],
     triangle_count: Option<BufferHandle>,
 ) -> Result<SampleBuffer, TechniqueError> {
@@ -149,8 +135,8 @@ fn fill(
 }
 
 /// Specialization constants of shaders that include `multisample/shade.glsl`.
-pub(crate) fn shade_constants(frame: &Frame<'_>, samples: u32) -> [(&'static str, u32); 2] {
-    [("SAMPLES", samples), ("VIEW", view::number(frame.view))]
+pub fn shade_constants(frame: &Frame<'_>, samples: u32) -> [(&'static str, u32); 2] {
+    [("SAMPLES", samples), ("VIEW", views::number(frame.view))]
 }
 
 /// Declares the pass `technique/shade`: shades every surface that `source` (a tag of `multisample/shade.comp`) holds of a
@@ -164,12 +150,12 @@ pub fn shade(
     frame: &Frame<'_>,
     info: &Info,
     (source, samples): (&str, u32),
-    surfaces: &clusters::Surfaces<'_>,
+    surfaces: &cells::VisibleDepths<'_>,
     bind: &dyn Fn(&mut dyn SourceSlots),
 ) -> Result<ImageHandle, TechniqueError> {
     let technique = info.id;
     let step = LightStep::build(graph, frame, info, surfaces)?;
-    let name = format!("multisample/shade.comp#{source}");
+    let name = format!("surfaces/shade/shade.comp#{source}");
     // Lists hold emission in their blocks, a triangle buffer has no need to.
     let shader = frame.shader(&if source.starts_with("list") || source.starts_with("dais") {
         name
@@ -194,7 +180,7 @@ pub fn shade(
         LightStep::None => {
             // Lights know nothing of what indirect light shares.
             let source = source.trim_end_matches("-grid").trim_end_matches("-quads");
-            let fragment = format!("multisample/volume.frag#{source}");
+            let fragment = format!("surfaces/shade/volume.frag#{source}");
             add_volumes(graph, frame, (technique, &fragment), radiance, &|pass| {
                 pass.constant("SAMPLES", samples);
                 bind(pass);
@@ -232,14 +218,14 @@ impl SourceSlots for VolumePass<'_, '_> {
 ///
 /// # Errors
 /// A shader that is not compiled in.
-pub(crate) fn add_volumes(
+pub fn add_volumes(
     graph: &mut Graph,
     frame: &Frame<'_>,
     (technique, fragment): (&str, &str),
     radiance: ImageHandle,
     bind: &dyn Fn(&mut dyn SourceSlots),
 ) -> Result<ImageHandle, TechniqueError> {
-    if view::number(frame.view) > 0 {
+    if views::number(frame.view) > 0 {
         return Ok(radiance);
     }
     let mut pass = graph.raster(&format!("{technique}/lights"));
@@ -257,12 +243,12 @@ pub(crate) fn add_volumes(
 ///
 /// # Errors
 /// A shader that is not compiled in.
-pub(crate) fn full_screen(
+pub fn full_screen(
     frame: &Frame<'_>,
     fragment: &str,
     constants: &[(&str, u32)],
 ) -> Result<afterlight_graph::RasterState, TechniqueError> {
-    let vertex = frame.shader("multisample/full_screen.vert")?;
+    let vertex = frame.shader("surfaces/shade/full_screen.vert")?;
     let fragment = frame.shader(fragment)?;
     let mut state = afterlight_graph::RasterState::new(&vertex, Some(&fragment));
     state.constants = frame.constants(&[&vertex, &fragment]);
@@ -271,7 +257,7 @@ pub(crate) fn full_screen(
 }
 
 /// Draws a triangle over the whole image.
-pub(crate) fn draw_full_screen(
+pub fn draw_full_screen(
     pass: &mut RasterPass<'_>,
     state: afterlight_graph::RasterState,
     stencil_reference: u32,

@@ -5,8 +5,8 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 layout(local_size_x = 8, local_size_y = 8) in;
-#include "multisample/shade.glsl"
-#include "light_step/radiance.glsl"
+#include "surfaces/shade/shade.glsl"
+#include "lights/step/radiance.glsl"
 
 layout(set = 0, binding = 14, rgba16f) writeonly uniform image2D hdr;
 

@@ -2,7 +2,7 @@
 // In: the source's images, gbuffer_depth. Out: linear radiance.
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#include "multisample/shade.glsl"
+#include "surfaces/shade/shade.glsl"
 
 layout(location = 0) out vec4 radiance_out;
 

@@ -4,10 +4,10 @@
 // samples without a surface. Weights are samples; they and the background sum to SAMPLES.
 #include "shading.glsl"
 #include "heat.glsl"
-#include "multisample/sample_depth.glsl"
+#include "surfaces/visible/sample_depth.glsl"
 
 #if defined(SOURCE_DEDUP)
-#include "multisample/source_dedup.glsl"
+#include "surfaces/shade/source_dedup.glsl"
 #elif defined(SOURCE_DAIS)
 #include "dais/source_dais.glsl"
 #elif defined(SOURCE_DAIS_LIST)
@@ -15,7 +15,7 @@
 #elif defined(SOURCE_LIST)
 #include "gbuffer_list/source_list.glsl"
 #else
-#include "multisample/source_samples.glsl"
+#include "surfaces/shade/source_samples.glsl"
 #endif
 
 // 0 the image, 1 sample-usage, 2 invocations, 3 edges, 4 weights (techniques/src/view/mod.rs).

@@ -3,7 +3,7 @@
 layout(set = 0, binding = 9) uniform texture2DMS gbuffer_base_color;
 layout(set = 0, binding = 10) uniform texture2DMS gbuffer_normal;
 #define IDS_BINDING 11
-#include "multisample/triangles.glsl"
+#include "surfaces/visible/triangles.glsl"
 layout(set = 0, binding = 12) uniform texture2DMS gbuffer_distance;
 #ifdef EMISSION
 layout(set = 0, binding = 16) uniform texture2DMS gbuffer_emission;

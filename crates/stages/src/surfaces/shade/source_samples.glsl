@@ -2,7 +2,7 @@
 //
 // SOURCE_SSAA: every sample. SOURCE_MSAA: every sample where a triangle's edge crosses the pixel, else the first alone;
 // PIXEL_RATE and SAMPLE_RATE say which before.
-#include "multisample/edge_mark.glsl"
+#include "surfaces/shade/edge_mark.glsl"
 
 layout(set = 0, binding = 9) uniform texture2DMS gbuffer_base_color;
 layout(set = 0, binding = 10) uniform texture2DMS gbuffer_normal;

@@ -11,12 +11,12 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "triangle.glsl"
-#include "triangle_buffer/record.glsl"
+#include "surfaces/triangles/record.glsl"
 #ifdef WHOLE_TRIANGLE
-#include "triangle_buffer/vertices.glsl"
+#include "surfaces/triangles/vertices.glsl"
 #endif
 #ifndef LISTED
-#include "triangle_buffer/index.glsl"
+#include "surfaces/triangles/index.glsl"
 #endif
 
 layout(local_size_x = 128) in;

@@ -2,7 +2,7 @@
 // EXPLICIT_GRADIENTS.
 #ifndef AFTERLIGHT_INTERPOLATE
 #define AFTERLIGHT_INTERPOLATE
-#include "triangle_buffer/record.glsl"
+#include "surfaces/triangles/record.glsl"
 
 layout(set = 0, binding = 20, scalar) readonly buffer TriangleBuffer {
     uint triangle_buffer[];

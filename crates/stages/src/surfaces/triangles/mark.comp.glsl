@@ -6,8 +6,8 @@
 #include "frame.glsl"
 #include "scene.glsl"
 #define IDS_BINDING 8
-#include "multisample/triangles.glsl"
-#include "triangle_buffer/marks.glsl"
+#include "surfaces/visible/triangles.glsl"
+#include "surfaces/triangles/marks.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 void main() {

@@ -8,14 +8,8 @@
 
 use afterlight_graph::{BufferHandle, ComputePass, Graph, RasterPass};
 
-use crate::{
-    capacity::{self, FIRST_GUESS},
-    error::TechniqueError,
-    frame::{Frame, Slots},
-    multisample::Visible,
-    scene_gpu::DRAW_TRIANGLES,
-    view,
-};
+use afterlight_frame::{Frame, Slots, TechniqueError, capacity::{FIRST_GUESS, self}, scene::DRAW_TRIANGLES, views};
+use crate::surfaces::visible::Visible;
 
 /// Words of 32 bits for a draw's triangles.
 const WORDS_A_DRAW: u64 = DRAW_TRIANGLES as u64 / 32;
@@ -24,11 +18,11 @@ const GROUP_TRIANGLES: u32 = 128;
 
 /// Records of triangles.
 pub struct Records {
-    pub(crate) words: BufferHandle,
+    pub words: BufferHandle,
     /// Triangle ID of each record, for the views that ask for it.
-    pub(crate) ids: Option<BufferHandle>,
+    pub ids: Option<BufferHandle>,
     /// Records that there is room for.
-    pub(crate) capacity: u32,
+    pub capacity: u32,
 }
 
 impl Records {
@@ -113,7 +107,7 @@ impl List {
         technique: &str,
     ) -> Result<Records, TechniqueError> {
         let groups = graph.buffer(&format!("{technique}/dispatch groups"), 12);
-        let shader = frame.shader("triangle_buffer/size.comp")?;
+        let shader = frame.shader("surfaces/triangles/size.comp")?;
         let mut pass = frame.compute(graph, &format!("{technique}/size"), &shader);
         pass.constant("TRIANGLE_CAPACITY", self.capacity);
         pass.read("TriangleCount", &self.count);
@@ -123,7 +117,7 @@ impl List {
 
         let ids = RecordIds::wanted(graph, frame, technique, self.capacity);
         let stored = if frame.tessellate_px.is_some() { "vertices" } else { "list" };
-        let shader = frame.shader(&format!("triangle_buffer/derivatives.comp#{stored}{}", ids.tag('-')))?;
+        let shader = frame.shader(&format!("surfaces/triangles/derivatives.comp#{stored}{}", ids.tag('-')))?;
         let mut pass = frame.compute(graph, &format!("{technique}/derivatives"), &shader);
         pass.constant("TRIANGLE_CAPACITY", self.capacity);
         pass.read("TriangleCount", &self.count);
@@ -143,7 +137,7 @@ struct RecordIds(Option<BufferHandle>);
 
 impl RecordIds {
     fn wanted(graph: &mut Graph, frame: &Frame<'_>, technique: &str, capacity: u32) -> Self {
-        let wanted = view::compares_triangles(frame.view) && frame.tessellate_px.is_none();
+        let wanted = views::compares_triangles(frame.view) && frame.tessellate_px.is_none();
         let bytes = 4 * u64::from(capacity.max(1));
         Self(wanted.then(|| graph.buffer(&format!("{technique}/record ids"), bytes)))
     }
@@ -183,7 +177,7 @@ pub fn fill(
 ) -> Result<TriangleBuffer, TechniqueError> {
     let name = |stage: &str| format!("{technique}/{stage}");
     let bits = bits(graph, frame, technique, 0);
-    let shader = frame.shader(&format!("triangle_buffer/mark.comp{}", visible.tag('#')))?;
+    let shader = frame.shader(&format!("surfaces/triangles/mark.comp{}", visible.tag('#')))?;
     let mut pass = frame.compute(graph, &name("mark"), &shader);
     pass.constant("SAMPLES", visible.samples());
     visible.bind(frame, &mut pass);
@@ -226,7 +220,7 @@ pub fn store_marked(
     let count = graph.buffer(&name("triangle count"), 8);
     let words = graph.buffer(&name("triangle buffer"), bytes);
 
-    let mut pass = frame.compute(graph, &name("count"), &frame.shader("triangle_buffer/count.comp")?);
+    let mut pass = frame.compute(graph, &name("count"), &frame.shader("surfaces/triangles/count.comp")?);
     pass.constant("DRAWS", draws);
     pass.read("VisibleBits", &bits);
     let before = pass.write("WordCounts", before);
@@ -234,7 +228,7 @@ pub fn store_marked(
     pass.dispatch([draws.div_ceil(64), 1, 1]);
     pass.finish();
 
-    let mut pass = frame.compute(graph, &name("scan"), &frame.shader("triangle_buffer/scan.comp")?);
+    let mut pass = frame.compute(graph, &name("scan"), &frame.shader("surfaces/triangles/scan.comp")?);
     pass.constant("DRAWS", draws).constant("TRIANGLE_CAPACITY", capacity);
     pass.read("VisibleOfDraw", &of_draw);
     let base = pass.write("DrawBaseOut", base);
@@ -244,7 +238,7 @@ pub fn store_marked(
 
     let ids = RecordIds::wanted(graph, frame, technique, capacity);
     let tag = if by_keys { format!("#keys{}", ids.tag('-')) } else { ids.tag('#') };
-    let shader = frame.shader(&format!("triangle_buffer/derivatives.comp{tag}"))?;
+    let shader = frame.shader(&format!("surfaces/triangles/derivatives.comp{tag}"))?;
     let mut pass = frame.compute(graph, &name("derivatives"), &shader);
     pass.constant("TRIANGLE_CAPACITY", capacity);
     pass.read("VisibleBits", &bits).read("VisibleBefore", &before).read("DrawBase", &base);

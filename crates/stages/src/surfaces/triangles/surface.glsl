@@ -1,7 +1,7 @@
 // Surfaces of a pixel for multisample/shade.glsl from a source of triangles: source_next_triangle(name, weight), source_place(name).
 #ifndef AFTERLIGHT_TRIANGLE_SURFACE
 #define AFTERLIGHT_TRIANGLE_SURFACE
-#include "triangle_buffer/interpolate.glsl"
+#include "surfaces/triangles/interpolate.glsl"
 
 Surface surface_of_triangle(uint place, vec2 pixel) {
     uint material;
@@ -11,7 +11,7 @@ Surface surface_of_triangle(uint place, vec2 pixel) {
 }
 
 #ifdef LOW_RATE
-#include "dais_multirate/low_rate.glsl"
+#include "surfaces/low_rate/low_rate.glsl"
 #endif
 
 bool source_next(out Surface s, out uint weight) {

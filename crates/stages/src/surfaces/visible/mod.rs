@@ -3,13 +3,11 @@
 
 use afterlight_graph::{BufferHandle, Graph, ImageHandle, Load, gpu::vk};
 
-use super::NO_TRIANGLE_RGBA8;
-use crate::{
-    Info, clusters, compute_raster,
-    error::TechniqueError,
-    frame::{Frame, Slots},
-    geometry::Surfaces,
-};
+use afterlight_frame::{Frame, Info, Slots, TechniqueError};
+use crate::{lights::cells, surfaces::{compute_raster, geometry::SceneDraws}};
+
+/// What a pixel without a surface holds in an image of triangle IDs: `NO_TRIANGLE`, all ones.
+pub const NO_TRIANGLE_RGBA8: [f32; 4] = [1.0; 4];
 
 /// What samples show, as `multisample/triangles.glsl` reads it: triangle IDs, or keys of [`compute_raster`].
 pub enum Visible {
@@ -51,10 +49,10 @@ impl Visible {
         let image = |format| frame.image_info(format).samples(samples);
         let ids = graph.image(&name("ids"), image(vk::Format::R8G8B8A8_UNORM));
         let depth = graph.image(&name("depth"), image(vk::Format::D32_SFLOAT));
-        let surfaces = Surfaces::new(
+        let surfaces = SceneDraws::new(
             frame,
-            ("geometry/surface.vert#position", Some("visibility/ids.frag#rgba8")),
-            ("geometry/surface.vert#uv", "visibility/ids.frag#rgba8-mask"),
+            ("surfaces/geometry/surface.vert#position", Some("surfaces/visible/ids.frag#rgba8")),
+            ("surfaces/geometry/surface.vert#uv", "surfaces/visible/ids.frag#rgba8-mask"),
         )?;
         let mut pass = graph.raster(&name("ids"));
         frame.bind_scene(&mut pass);
@@ -66,10 +64,10 @@ impl Visible {
     }
 
     /// Where the surfaces stand.
-    pub fn surfaces(&self) -> clusters::Surfaces<'_> {
+    pub fn surfaces(&self) -> cells::VisibleDepths<'_> {
         match self {
-            Self::Ids { depth, samples, .. } => clusters::Surfaces::of_depth(depth, *samples),
-            Self::Keys { keys, samples } => clusters::Surfaces::of_keys(keys, *samples),
+            Self::Ids { depth, samples, .. } => cells::VisibleDepths::of_depth(depth, *samples),
+            Self::Keys { keys, samples } => cells::VisibleDepths::of_keys(keys, *samples),
         }
     }
 

@@ -1,10 +1,10 @@
 // The triangles that samples show: IDs, or the keys of compute_raster (SAMPLES_IN_KEYS). Needs frame.glsl, scene.glsl; IDS_BINDING.
 #ifndef AFTERLIGHT_TRIANGLES
 #define AFTERLIGHT_TRIANGLES
-#include "multisample/samples.glsl"
+#include "surfaces/visible/samples.glsl"
 
 #ifdef SAMPLES_IN_KEYS
-#include "compute_raster/key_ids.glsl"
+#include "surfaces/compute_raster/key_ids.glsl"
 
 // A name that tells the sample's triangle from others; NO_TRIANGLE where there is none.
 uint sample_triangle(ivec2 pixel, uint i) {

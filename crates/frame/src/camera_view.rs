@@ -1,0 +1,141 @@
+//! A camera's matrices for an image size, and what of the scene they bound.
+
+use afterlight_graph::Rect;
+use afterlight_scene::{Aabb, Projection};
+use afterlight_shader::structs::FrameConstants;
+use glam::{Mat4, Vec3, Vec4};
+
+use crate::{SceneGpu, SceneLights, Settings, views};
+
+/// A camera's matrices for an image size.
+pub struct CameraView {
+    pub clip_from_world: Mat4,
+    view_from_world: Mat4,
+    pub eye_ws: Vec3,
+}
+
+impl CameraView {
+    pub fn new(settings: &Settings) -> Self {
+        let aspect = settings.width_px as f32 / settings.height_px as f32;
+        let view_from_world = settings.camera.view_from_world();
+        Self {
+            clip_from_world: settings.camera.clip_from_view(aspect) * view_from_world,
+            view_from_world,
+            eye_ws: settings.camera.eye_ws(),
+        }
+    }
+
+    /// What the view distance of a point p, m, is: dot(xyz, p) + w. The view looks along -z.
+    pub fn distance_from_world(&self) -> Vec4 {
+        -self.view_from_world.row(2)
+    }
+
+    pub fn constants(&self, settings: &Settings, lights: &SceneLights, scene: &SceneGpu) -> FrameConstants {
+        let distance_from_world = self.distance_from_world();
+        let near_m = match settings.camera.projection {
+            Projection::Perspective { near_m, .. } | Projection::Orthographic { near_m, .. } => near_m,
+        };
+        let bounds_ws = scene.bounds_ws(settings.displacement_m);
+        let to_eye = self.view_from_world.row(2).truncate();
+        let (depth_to_distance, eye) = match settings.camera.projection {
+            Projection::Perspective { near_m, .. } => {
+                (Vec4::new(0.0, near_m, 1.0, 0.0), self.eye_ws.extend(1.0))
+            }
+            Projection::Orthographic { near_m, far_m, .. } => {
+                (Vec4::new(near_m - far_m, far_m, 0.0, 1.0), to_eye.extend(0.0))
+            }
+        };
+        FrameConstants {
+            clip_from_world: self.clip_from_world.to_cols_array_2d(),
+            world_from_clip: inverse(self.clip_from_world),
+            depth_to_distance: depth_to_distance.into(),
+            distance_from_world: distance_from_world.into(),
+            eye_ws: eye.into(),
+            size_px: [settings.width_px, settings.height_px],
+            tile_count: [settings.width_px.div_ceil(16), settings.height_px.div_ceil(16)],
+            ambient_radiance: settings.environment.ambient_radiance.into(),
+            light_count: lights.count,
+            background_radiance: background_radiance(settings).into(),
+            unbounded_light_count: lights.unbounded_count,
+            distance_range_m: distance_range_m(&bounds_ws, distance_from_world, near_m),
+        }
+    }
+}
+
+/// Nearest and farthest view distance, m, of what lies in a box and behind the near plane, with room for rounding. The nearest is
+/// at least this share of the farthest: slices at equal ratios would else be spent on what nobody sees.
+fn distance_range_m(bounds_ws: &Aabb, distance_from_world: Vec4, near_m: f32) -> [f32; 2] {
+    const LEAST_SHARE: f32 = 1e-4;
+    if bounds_ws.is_empty() {
+        return [1.0, 2.0];
+    }
+    let center_m = distance_from_world.dot(bounds_ws.center().extend(1.0));
+    let half_m = 0.5 * distance_from_world.truncate().abs().dot(bounds_ws.size());
+    let farthest_m = (1.001 * (center_m + half_m)).max(f32::MIN_POSITIVE * 1e8);
+    let nearest_m = (0.999 * (center_m - half_m)).max(0.999 * near_m).max(LEAST_SHARE * farthest_m);
+    [nearest_m, farthest_m.max(2.0 * nearest_m)]
+}
+
+/// Radiance of pixels without a surface: none where it would be taken for pairs of lights.
+pub fn background_radiance(settings: &Settings) -> Vec3 {
+    match views::replaces_light(&settings.view) {
+        true => Vec3::ZERO,
+        false => settings.environment.background_radiance,
+    }
+}
+
+/// Inverse, computed in 64 bits: positions are reconstructed through it.
+fn inverse(m: Mat4) -> [[f32; 4]; 4] {
+    m.as_dmat4().inverse().as_mat4().to_cols_array_2d()
+}
+
+/// Pixels that a box may cover: all where it reaches behind the eye's plane, none where it lies outside the image.
+pub fn screen_rect(clip_from_world: Mat4, bounds: &Aabb, whole: Rect) -> Option<Rect> {
+    let corners = (0..8).map(|i| {
+        let pick = glam::BVec3::new(i & 1 != 0, i & 2 != 0, i & 4 != 0);
+        clip_from_world * Vec3::select(pick, bounds.max, bounds.min).extend(1.0)
+    });
+    let (mut low, mut high) = (glam::Vec2::INFINITY, glam::Vec2::NEG_INFINITY);
+    for c in corners {
+        if c.w <= 1e-6 {
+            return Some(whole);
+        }
+        let ndc = c.truncate().truncate() / c.w;
+        (low, high) = (low.min(ndc), high.max(ndc));
+    }
+    let size = glam::Vec2::new(whole.width_px as f32, whole.height_px as f32);
+    // A pixel more on each side than rounding can move a bound.
+    let low = ((low * 0.5 + 0.5) * size - 1.0).floor().max(glam::Vec2::ZERO);
+    let high = ((high * 0.5 + 0.5) * size + 1.0).ceil().min(size);
+    low.cmplt(high).all().then_some(Rect {
+        x_px: low.x as u32,
+        y_px: low.y as u32,
+        width_px: (high.x - low.x) as u32,
+        height_px: (high.y - low.y) as u32,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use afterlight_scene::Camera;
+    use proptest::prelude::*;
+
+    const WHOLE: Rect = Rect { x_px: 0, y_px: 0, width_px: 100, height_px: 60 };
+
+    proptest! {
+        /// Every pixel whose ray meets the box lies in the rectangle.
+        #[test]
+        fn the_rectangle_covers_the_box(c in prop::array::uniform3(-8f32..8.0), r in 0.1f32..3.0, p in prop::array::uniform3(-1f32..1.0)) {
+            let clip = Camera::look_at("c", Vec3::new(0.0, 1.0, 9.0), Vec3::ZERO, 1.0, 0.1);
+            let clip = clip.clip_from_view(100.0 / 60.0) * clip.view_from_world();
+            let bounds = Aabb { min: Vec3::from(c) - r, max: Vec3::from(c) + r };
+            let q = clip * (Vec3::from(c) + Vec3::from(p) * r).extend(1.0);
+            prop_assume!(q.w > 0.0 && q.x.abs() <= q.w && q.y.abs() <= q.w);
+            let (x, y) = ((q.x / q.w * 0.5 + 0.5) * 100.0, (q.y / q.w * 0.5 + 0.5) * 60.0);
+            let rect = screen_rect(clip, &bounds, WHOLE).expect("a point of the box is on the image");
+            prop_assert!(x >= rect.x_px as f32 && x <= (rect.x_px + rect.width_px) as f32);
+            prop_assert!(y >= rect.y_px as f32 && y <= (rect.y_px + rect.height_px) as f32);
+        }
+    }
+}

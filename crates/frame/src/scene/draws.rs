@@ -1,0 +1,160 @@
+//! Draws: pieces of instances of at most 1,024 triangles, sorted into buckets by their state.
+
+use std::sync::Arc;
+
+use afterlight_scene::{Aabb, AlphaMode, Material, Scene, TextureRef};
+use afterlight_shader::structs::{DRAW_MIRRORED, DrawData, TRIANGLE_BITS};
+
+use crate::TechniqueError;
+
+/// Most triangles of one draw. A triangle ID keeps the triangle's number within its draw in `TRIANGLE_BITS` bits, and
+/// draws are what is culled: larger draws cull worse, smaller ones cost more commands.
+pub const DRAW_TRIANGLES: u32 = 1 << TRIANGLE_BITS;
+
+/// Kinds of draws, which differ in pipeline or fixed-function state; draws of one kind are one indirect call.
+pub const BUCKETS: usize = 8;
+
+/// What of a draw the CPU needs: for culling, sorting and the indirect command.
+#[derive(Clone, Copy, Debug)]
+pub struct DrawInfo {
+    pub bounds_ws: Aabb,
+    pub index_count: u32,
+    pub first_index: u32,
+    pub first_vertex: u32,
+    pub fetches: TextureFetches,
+}
+
+/// Textures that a fragment of a material reads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TextureFetches {
+    /// For its surface.
+    pub all: u8,
+    /// For what the lobes of its BRDF need alone: normal, roughness, and alpha where it is masked.
+    pub lobe: u8,
+}
+
+impl TextureFetches {
+    fn new(material: &Material) -> Self {
+        let count = |textures: &[&Option<TextureRef>]| textures.iter().filter(|t| t.is_some()).count() as u8;
+        let m = material;
+        let lobe = [&m.normal_texture, &m.metallic_roughness_texture];
+        let colors = [&m.occlusion_texture, &m.emissive_texture];
+        let masked = matches!(m.alpha_mode, AlphaMode::Mask { .. });
+        let base_color = count(&[&m.base_color_texture]);
+        Self {
+            all: count(&lobe) + count(&colors) + base_color,
+            lobe: count(&lobe) + base_color * u8::from(masked),
+        }
+    }
+}
+
+/// Bucket of a draw: alpha-masked 4, double-sided 2, mirrored 1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Bucket(pub usize);
+
+impl Bucket {
+    /// Opaque and double-sided: a state that drops no face.
+    pub const DOUBLE_SIDED: Self = Self(2);
+
+    pub fn masked(self) -> bool {
+        self.0 & 4 != 0
+    }
+    pub fn double_sided(self) -> bool {
+        self.0 & 2 != 0
+    }
+    pub fn mirrored(self) -> bool {
+        self.0 & 1 != 0
+    }
+}
+
+/// A draw: its record, what the CPU needs of it, the names of its node and its material.
+type Draw = (DrawData, DrawInfo, [Arc<str>; 2]);
+
+/// All draws of a scene by bucket, then those with alpha blending.
+pub(super) struct DrawTable {
+    /// Of all draws.
+    pub(super) data: Vec<DrawData>,
+    /// Of those in buckets.
+    pub(super) infos: Vec<DrawInfo>,
+    pub(super) names: Vec<[Arc<str>; 2]>,
+    pub(super) bucket_first: [u32; BUCKETS + 1],
+    /// Of those with alpha blending.
+    pub(super) blended: Vec<DrawInfo>,
+}
+
+impl DrawTable {
+    pub(super) fn new(scene: &Scene, pieces: &[Vec<Aabb>]) -> Result<Self, TechniqueError> {
+        let mut by_bucket: [Vec<Draw>; BUCKETS] = Default::default();
+        let mut blended: Vec<Draw> = Vec::new();
+        for instance in &scene.instances {
+            let mesh = &scene.meshes[instance.mesh as usize];
+            let material = &scene.materials[mesh.material as usize];
+            let m = &instance.world_from_object;
+            let mirrored = m.matrix3.determinant() < 0.0;
+            let masked = matches!(material.alpha_mode, AlphaMode::Mask { .. });
+            let bucket =
+                4 * usize::from(masked) + 2 * usize::from(material.double_sided) + usize::from(mirrored);
+            let node = scene.nodes.get(instance.node as usize).map_or("", |node| node.name.as_str());
+            let names: [Arc<str>; 2] = [node.into(), material.name.as_str().into()];
+            let rows = [0, 1, 2].map(|i| {
+                let row = m.matrix3.row(i);
+                [row.x, row.y, row.z, m.translation[i]]
+            });
+            let draws = match material.alpha_mode {
+                AlphaMode::Blend => &mut blended,
+                _ => &mut by_bucket[bucket],
+            };
+            for (piece, bounds_os) in pieces[instance.mesh as usize].iter().enumerate() {
+                let first = piece as u32 * DRAW_TRIANGLES * 3;
+                let first_index = mesh.first_index + first;
+                draws.push((
+                    DrawData {
+                        object_row0: rows[0],
+                        object_row1: rows[1],
+                        object_row2: rows[2],
+                        first_index,
+                        first_vertex: mesh.first_vertex,
+                        material: mesh.material,
+                        flags: if mirrored { DRAW_MIRRORED } else { 0 },
+                    },
+                    DrawInfo {
+                        bounds_ws: bounds_os.transformed(m),
+                        index_count: (mesh.index_count - first).min(DRAW_TRIANGLES * 3),
+                        first_index,
+                        first_vertex: mesh.first_vertex,
+                        fetches: TextureFetches::new(material),
+                    },
+                    names.clone(),
+                ));
+            }
+        }
+        let mut table = Self {
+            data: Vec::new(),
+            infos: Vec::new(),
+            names: Vec::new(),
+            bucket_first: [0; BUCKETS + 1],
+            blended: Vec::new(),
+        };
+        for (bucket, draws) in by_bucket.into_iter().enumerate() {
+            for (data, info, names) in draws {
+                table.data.push(data);
+                table.infos.push(info);
+                table.names.push(names);
+            }
+            table.bucket_first[bucket + 1] = table.data.len() as u32;
+        }
+        for (data, info, _) in blended {
+            table.data.push(data);
+            table.blended.push(info);
+        }
+        let limit = u64::from(u32::MAX >> TRIANGLE_BITS);
+        if table.data.len() as u64 >= limit {
+            return Err(TechniqueError::TooLarge {
+                what: format!("draws of at most {DRAW_TRIANGLES} triangles in the scene"),
+                found: table.data.len() as u64,
+                limit: limit - 1,
+            });
+        }
+        Ok(table)
+    }
+}

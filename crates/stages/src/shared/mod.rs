@@ -1,0 +1,5 @@
+//! Work that a frame does once, whatever the technique: the view of a light, its shadows, the light that its surfaces reflect.
+
+pub mod indirect;
+pub mod light_view;
+pub mod shadow;
