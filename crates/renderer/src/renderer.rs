@@ -7,7 +7,7 @@ use afterlight_graph::{
     gpu::{self, vk},
 };
 use afterlight_scene::Scene;
-use afterlight_shader::Shader;
+use afterlight_shader::{Shader, structs::FrameConstants};
 
 use afterlight_frame::{
     Board, CameraView, Frame, LightPairs, MAX_DISPLACEMENT_M, MIN_TESSELLATE_PX, Params, SceneBuffers,
@@ -28,7 +28,7 @@ use afterlight_stages::{
     },
     lights::volumes,
     shared::{indirect, shadow},
-    light_pair_colors,
+    views::light_pair_colors,
 };
 
 /// Times that a view is recorded at most until everything that can overflow has room.

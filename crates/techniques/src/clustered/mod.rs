@@ -2,12 +2,14 @@
 
 // ORDER: 62
 
+pub mod cost;
+
 use afterlight_graph::{Graph, ImageHandle, gpu::vk};
 
 use afterlight_shader::Shader;
 use afterlight_frame::{Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError};
-use afterlight_stages::{lights::{cells::{Division, Grid, Surfaces, self}, step::LightStep}, surfaces::gbuffer};
-use afterlight_cost::{Cost, Workload, clustered_deferred};
+use afterlight_stages::{lights::{cells::{Division, Grid, VisibleDepths, self}, step::LightStep}, surfaces::gbuffer};
+use afterlight_cost::{Cost, Workload};
 
 /// The technique.
 pub static TECHNIQUE: Clustered = Clustered;
@@ -36,7 +38,7 @@ static INFO: Info = Info {
         rates_decoupled: "n, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
-    params: cells::PARAMS,
+    params: afterlight_frame::params::CLUSTERS,
     needs: &[],
     samples: &[1],
     tessellation: true,
@@ -57,12 +59,12 @@ impl Technique for Clustered {
     }
 
     fn predict(&self, workload: &Workload, params: &Params) -> Cost {
-        clustered_deferred(workload, division(params).most_pixels())
+        cost::clustered_deferred(workload, division(params).most_pixels())
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let filled = gbuffer::fill(graph, frame, INFO.id, vk::Format::D32_SFLOAT)?;
-        let surfaces = Surfaces::of_depth(&filled.depth, 1);
+        let surfaces = VisibleDepths::of_depth(&filled.depth, 1);
         let lists = cells::build(graph, frame, INFO.id, division(frame.params), &surfaces)?;
         drop(surfaces);
         gbuffer::shade(graph, frame, INFO.id, filled, &LightStep::Cells(lists))

@@ -2,12 +2,14 @@
 
 // ORDER: 64
 
+pub mod cost;
+
 use afterlight_graph::{Graph, ImageHandle};
 
 use afterlight_shader::Shader;
 use afterlight_frame::{ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError};
 use afterlight_stages::{lights::cells::{Division, Grid, self}, surfaces::depth_first::record_forward};
-use afterlight_cost::{Cost, Workload, clustered_forward};
+use afterlight_cost::{Cost, Workload};
 
 /// The technique.
 pub static TECHNIQUE: ClusteredForward = ClusteredForward;
@@ -36,7 +38,7 @@ static INFO: Info = Info {
         rates_decoupled: "n, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
-    params: cells::PARAMS,
+    params: afterlight_frame::params::CLUSTERS,
     needs: &[],
     samples: ANY_SAMPLES,
     tessellation: true,
@@ -57,7 +59,7 @@ impl Technique for ClusteredForward {
     }
 
     fn predict(&self, workload: &Workload, params: &Params) -> Cost {
-        clustered_forward(workload, division(params).most_pixels())
+        cost::clustered_forward(workload, division(params).most_pixels())
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {

@@ -6,12 +6,14 @@ mod passes;
 
 pub(crate) use passes::{FillPass, depth_surfaces};
 
+pub mod cost;
+
 use afterlight_graph::{BufferHandle, Graph, ImageHandle, Load, RasterPass, gpu::vk};
 
 use afterlight_shader::Shader;
 use afterlight_frame::{OpaqueDepth, ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, ParamInfo, ParamKind, Params, Source, SourceSlots, Technique, TechniqueError, views};
-use afterlight_stages::{lights::{cells, step}, surfaces::{compute_raster, shade::{NO_TRIANGLE_RGBA8, self}, triangles::{Records, self}, visible::Visible}};
-use afterlight_cost::{Cost, Workload, self};
+use afterlight_stages::{views::RecordSource, lights::{cells, step}, surfaces::{compute_raster, shade, visible::NO_TRIANGLE_RGBA8, triangles::{Records, self}, visible::Visible}};
+use afterlight_cost::{Cost, Workload};
 use crate::dais_multirate::LowRate;
 
 /// The technique.
@@ -189,7 +191,7 @@ pub(crate) fn shade(
 ) -> Result<ImageHandle, TechniqueError> {
     if views::is_of_triangles(frame.view) {
         let samples = frame.samples;
-        return views::RecordSource { technique: info.id, tag: source, samples, records, bind }
+        return RecordSource { technique: info.id, tag: source, samples, records, bind }
             .record(graph, frame);
     }
     let source = format!("{source}{}", rate.map_or("", LowRate::tag));

@@ -2,12 +2,14 @@
 
 // ORDER: 150
 
+pub mod cost;
+
 use afterlight_graph::{BufferHandle, Graph, ImageHandle, ImageInfo, Load, RasterPass};
 
 use afterlight_shader::Shader;
 use afterlight_frame::{Answers, Exactness, Frame, Info, MULTIPLE_SAMPLES, Need, ParamInfo, ParamKind, Params, Source, SourceSlots, Technique, TechniqueError, capacity::FIRST_GUESS, scene::DRAW_TRIANGLES, views};
-use afterlight_stages::{lights::{cells, step}, surfaces::{claims::NOT_TAKEN, depth_first::FIRST_FRAGMENT, triangles}};
-use afterlight_cost::{Cost, Workload, self};
+use afterlight_stages::{surfaces::claims, lights::{cells, step}, surfaces::{claims::NOT_TAKEN, depth_first::FIRST_FRAGMENT, triangles}};
+use afterlight_cost::{Cost, Workload};
 use crate::{dais::{Cache, FillPass, self}, dais_multirate::{FULL_RATE, LowRate, SHARE}, gbuffer_list::self};
 
 /// The technique.
@@ -127,7 +129,7 @@ impl Lists {
                 "sample drops",
                 if fixed.is_some() { pixels.next_multiple_of(4) } else { 4 },
             ),
-            claims: gbuffer_list::claims(graph, frame, INFO.id, frame.samples),
+            claims: claims::claims(graph, frame, INFO.id, frame.samples),
             capacity,
             bounded: fixed.is_some(),
         })

@@ -7,7 +7,7 @@ use afterlight_graph::{Graph, ImageHandle};
 use afterlight_shader::Shader;
 use afterlight_frame::{Answers, Exactness, Frame, Info, ParamInfo, ParamKind, Params, Source, SourceSlots, Technique, TechniqueError, views};
 use afterlight_stages::{shared::indirect::IndirectLight, lights::step, surfaces::compute_raster};
-use afterlight_cost::{Cost, Workload, self};
+use afterlight_cost::{Cost, Workload};
 use crate::dais;
 use afterlight_graph::gpu;
 
@@ -159,7 +159,7 @@ impl Technique for DaisMultirate {
     }
 
     fn predict(&self, workload: &Workload, _: &Params) -> Cost {
-        cost::dais(workload)
+        crate::dais::cost::dais(workload)
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {

@@ -2,12 +2,14 @@
 
 // ORDER: 40
 
+pub mod cost;
+
 use afterlight_graph::{Graph, ImageHandle, Load, gpu::vk};
 
 use afterlight_shader::Shader;
 use afterlight_frame::{OpaqueDepth, Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError};
 use afterlight_stages::{lights::{cells::VisibleDepths, step::{LightStep, self}, volumes}, surfaces::gbuffer};
-use afterlight_cost::{Cost, Workload, self};
+use afterlight_cost::{Cost, Workload};
 
 /// The technique.
 pub static TECHNIQUE: Deferred = Deferred;

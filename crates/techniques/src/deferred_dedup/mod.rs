@@ -2,11 +2,13 @@
 
 // ORDER: 120
 
+pub mod cost;
+
 use afterlight_graph::{Graph, ImageHandle};
 
 use afterlight_shader::Shader;
 use afterlight_frame::{OpaqueDepth, Answers, AppendixA, Exactness, Frame, Info, MULTIPLE_SAMPLES, Params, Source, Technique, TechniqueError};
-use afterlight_cost::{Cost, Workload, deferred_dedup};
+use afterlight_cost::{Cost, Workload};
 use afterlight_stages::{lights::step, surfaces::shade};
 
 /// The technique.
@@ -53,7 +55,7 @@ impl Technique for DeferredDedup {
     }
 
     fn predict(&self, workload: &Workload, _: &Params) -> Cost {
-        deferred_dedup(workload)
+        cost::deferred_dedup(workload)
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {

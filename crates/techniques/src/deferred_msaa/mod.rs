@@ -3,11 +3,13 @@
 
 // ORDER: 110
 
+pub mod cost;
+
 use afterlight_graph::{DepthTest, Graph, ImageHandle, Load, StencilFace, StencilTest, gpu::vk};
 
 use afterlight_shader::Shader;
 use afterlight_frame::{OpaqueDepth, Answers, AppendixA, Exactness, Frame, Info, MULTIPLE_SAMPLES, Params, Source, Technique, TechniqueError};
-use afterlight_cost::{Cost, Workload, deferred_msaa};
+use afterlight_cost::{Cost, Workload};
 use afterlight_stages::{lights::step, surfaces::shade::{SampleBuffer, emission_variant, self}};
 
 /// The technique.
@@ -67,7 +69,7 @@ impl Technique for DeferredMsaa {
     }
 
     fn predict(&self, workload: &Workload, _: &Params) -> Cost {
-        deferred_msaa(workload)
+        cost::deferred_msaa(workload)
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {

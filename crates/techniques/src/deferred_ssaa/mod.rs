@@ -6,7 +6,7 @@ use afterlight_graph::{Graph, ImageHandle};
 
 use afterlight_shader::Shader;
 use afterlight_frame::{OpaqueDepth, Answers, AppendixA, Exactness, Frame, Info, MULTIPLE_SAMPLES, Params, Source, Technique, TechniqueError};
-use afterlight_cost::{Cost, Workload, deferred_msaa};
+use afterlight_cost::{Cost, Workload};
 use afterlight_stages::{lights::step, surfaces::shade};
 
 /// The technique.
@@ -56,7 +56,7 @@ impl Technique for DeferredSsaa {
     }
 
     fn predict(&self, workload: &Workload, _: &Params) -> Cost {
-        deferred_msaa(workload)
+        crate::deferred_msaa::cost::deferred_msaa(workload)
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {

@@ -6,7 +6,7 @@ use afterlight_graph::{Blend, DepthTest, Graph, ImageHandle, Load, StencilFace, 
 
 use afterlight_shader::Shader;
 use afterlight_frame::{OpaqueDepth, Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError};
-use afterlight_cost::{Cost, Workload, self};
+use afterlight_cost::{Cost, Workload};
 use afterlight_stages::{lights::volumes, surfaces::gbuffer};
 
 /// The technique.
@@ -85,7 +85,7 @@ impl Technique for DeferredStencil {
             light_vertices: 2.0 * workload.light_vertices,
             ..*workload
         };
-        let mut cost = cost::deferred(&twice);
+        let mut cost = crate::deferred::cost::deferred(&twice);
         // one byte of stencil a pixel
         cost.mem += 0.25 * workload.pixels;
         cost

@@ -2,12 +2,14 @@
 
 // ORDER: 30
 
+pub mod cost;
+
 use afterlight_graph::{DepthTest, Graph, ImageHandle, Load, RasterPass, StencilFace, StencilTest, gpu::vk};
 
 use afterlight_shader::Shader;
 use afterlight_frame::{OpaqueDepth, ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError, views::INVOCATIONS};
-use afterlight_cost::{Cost, Workload, depth_prepass};
-use afterlight_stages::{surfaces::{depth_first::shaded_surfaces, geometry::SceneDraws, RadianceTarget}, views::InvocationCount};
+use afterlight_cost::{Cost, Workload};
+use afterlight_stages::{surfaces::depth_first::{FIRST_FRAGMENT, draw_depth}, surfaces::{depth_first::shaded_surfaces, geometry::SceneDraws, RadianceTarget}, views::InvocationCount};
 
 /// The technique.
 pub static TECHNIQUE: DepthPrepass = DepthPrepass;
@@ -53,7 +55,7 @@ impl Technique for DepthPrepass {
     }
 
     fn predict(&self, workload: &Workload, _: &Params) -> Cost {
-        depth_prepass(workload)
+        cost::depth_prepass(workload)
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {

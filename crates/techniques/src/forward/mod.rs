@@ -2,12 +2,14 @@
 
 // ORDER: 10
 
+pub mod cost;
+
 use afterlight_graph::{Graph, ImageHandle, Load, gpu::vk};
 
 use afterlight_shader::Shader;
 use afterlight_frame::{VisitsAllLights, OpaqueDepth, ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError, views::INVOCATIONS};
-use afterlight_cost::{Cost, Workload, forward};
-use afterlight_stages::{surfaces::{geometry::SceneDraws, RadianceTarget}, views::InvocationCount};
+use afterlight_cost::{Cost, Workload};
+use afterlight_stages::{surfaces::depth_first::shaded_surfaces, surfaces::{geometry::SceneDraws, RadianceTarget}, views::InvocationCount};
 
 /// The technique.
 pub static TECHNIQUE: Forward = Forward;
@@ -53,7 +55,7 @@ impl Technique for Forward {
     }
 
     fn predict(&self, workload: &Workload, _: &Params) -> Cost {
-        forward(workload, 1.0)
+        cost::forward(workload, 1.0)
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {

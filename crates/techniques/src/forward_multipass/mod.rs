@@ -7,8 +7,8 @@ use afterlight_scene::Aabb;
 use glam::{Mat4, Vec3};
 
 use afterlight_shader::Shader;
-use afterlight_frame::{OpaqueDepth, Answers, AppendixA, Exactness, Frame, Info, ParamInfo, ParamKind, Params, Source, Technique, TechniqueError};
-use afterlight_cost::{Cost, Workload, forward};
+use afterlight_frame::{camera_view::screen_rect, OpaqueDepth, Answers, AppendixA, Exactness, Frame, Info, ParamInfo, ParamKind, Params, Source, Technique, TechniqueError};
+use afterlight_cost::{Cost, Workload};
 use afterlight_stages::surfaces::{depth_first::FIRST_FRAGMENT, geometry::SceneDraws};
 
 /// The technique.
@@ -65,7 +65,7 @@ impl Technique for ForwardMultipass {
     }
 
     fn predict(&self, workload: &Workload, _: &Params) -> Cost {
-        forward(workload, 1.0 + workload.lights)
+        crate::forward::cost::forward(workload, 1.0 + workload.lights)
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {

@@ -2,12 +2,14 @@
 
 // ORDER: 68
 
+pub mod cost;
+
 use afterlight_graph::{Graph, ImageHandle};
 
 use afterlight_shader::Shader;
-use afterlight_frame::{ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError};
+use afterlight_frame::{params::TILE_PX, ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError};
 use afterlight_stages::{lights::cells::{Division, self}, surfaces::depth_first::record_forward};
-use afterlight_cost::{Cost, Workload, forward_plus};
+use afterlight_cost::{Cost, Workload};
 
 /// The technique.
 pub static TECHNIQUE: ForwardPlus = ForwardPlus;
@@ -39,7 +41,7 @@ static INFO: Info = Info {
         rates_decoupled: "n, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
-    params: &[cells::TILE_PX],
+    params: &[TILE_PX],
     needs: &[],
     samples: ANY_SAMPLES,
     tessellation: true,
@@ -47,7 +49,7 @@ static INFO: Info = Info {
 };
 
 fn division(params: &Params) -> Division {
-    Division::Tiles25d { tile_px: params.count(&cells::TILE_PX) }
+    Division::Tiles25d { tile_px: params.count(&TILE_PX) }
 }
 
 impl Technique for ForwardPlus {
@@ -60,7 +62,7 @@ impl Technique for ForwardPlus {
     }
 
     fn predict(&self, workload: &Workload, params: &Params) -> Cost {
-        forward_plus(&Workload { pixels_a_tile: division(params).most_pixels(), ..*workload })
+        cost::forward_plus(&Workload { pixels_a_tile: division(params).most_pixels(), ..*workload })
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {

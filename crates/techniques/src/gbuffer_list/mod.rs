@@ -4,14 +4,16 @@
 
 mod filter;
 
+pub mod cost;
+
 use afterlight_graph::{
     BufferHandle, DepthTest, Graph, ImageHandle, Load, StencilFace, StencilTest, gpu::vk,
 };
 
 use afterlight_shader::Shader;
 use afterlight_frame::{OpaqueDepth, ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, ParamInfo, ParamKind, Params, Source, Technique, TechniqueError};
-use afterlight_stages::{lights::{cells, step}, surfaces::{compute_raster, depth_first::FIRST_FRAGMENT, geometry::SceneDraws, shade::self, visible::Visible}};
-use afterlight_cost::{Cost, Workload, self};
+use afterlight_stages::{surfaces::claims::{NOT_TAKEN, claims}, lights::{cells, step}, surfaces::{compute_raster, depth_first::FIRST_FRAGMENT, geometry::SceneDraws, shade::self, visible::Visible}};
+use afterlight_cost::{Cost, Workload};
 
 /// The technique.
 pub static TECHNIQUE: GbufferList = GbufferList;

@@ -2,13 +2,15 @@
 
 // ORDER: 56
 
+pub mod cost;
+
 use afterlight_graph::{
     Blend, BufferHandle, DepthTest, Graph, ImageHandle, Load, RasterPass, StencilFace, StencilTest, gpu::vk,
 };
 
 use afterlight_shader::Shader;
 use afterlight_frame::{Answers, AppendixA, Exactness, Frame, Info, Need, ParamInfo, ParamKind, Params, Source, Technique, TechniqueError};
-use afterlight_cost::{Cost, Workload, self};
+use afterlight_cost::{Cost, Workload};
 use afterlight_stages::surfaces::{depth_first::FIRST_FRAGMENT, gbuffer::{GBuffer, self}, geometry::SceneDraws, shade};
 use crate::light_prepass::{SUMS, self};
 use paths::{Path, Run};

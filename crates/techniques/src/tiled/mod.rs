@@ -2,11 +2,13 @@
 
 // ORDER: 60
 
+pub mod cost;
+
 use afterlight_graph::{Graph, ImageHandle, gpu::vk};
 
 use afterlight_shader::Shader;
 use afterlight_frame::{OpaqueDepth, Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError};
-use afterlight_cost::{Cost, Workload, tiled_deferred};
+use afterlight_cost::{Cost, Workload};
 use afterlight_stages::surfaces::gbuffer;
 
 /// The technique.
@@ -53,7 +55,7 @@ impl Technique for Tiled {
     }
 
     fn predict(&self, workload: &Workload, _: &Params) -> Cost {
-        tiled_deferred(workload)
+        cost::tiled_deferred(workload)
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {

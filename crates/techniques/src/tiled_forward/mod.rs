@@ -2,12 +2,14 @@
 
 // ORDER: 66
 
+pub mod cost;
+
 use afterlight_graph::{Graph, ImageHandle};
 
 use afterlight_shader::Shader;
-use afterlight_frame::{ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError};
+use afterlight_frame::{params::TILE_PX, ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError};
 use afterlight_stages::{lights::cells::{Division, self}, surfaces::depth_first::record_forward};
-use afterlight_cost::{Cost, Workload, tiled_forward};
+use afterlight_cost::{Cost, Workload};
 
 /// The technique.
 pub static TECHNIQUE: TiledForward = TiledForward;
@@ -36,7 +38,7 @@ static INFO: Info = Info {
         rates_decoupled: "n, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
-    params: &[cells::TILE_PX],
+    params: &[TILE_PX],
     needs: &[],
     samples: ANY_SAMPLES,
     tessellation: true,
@@ -44,7 +46,7 @@ static INFO: Info = Info {
 };
 
 fn division(params: &Params) -> Division {
-    Division::Tiles { tile_px: params.count(&cells::TILE_PX) }
+    Division::Tiles { tile_px: params.count(&TILE_PX) }
 }
 
 impl Technique for TiledForward {
@@ -57,7 +59,7 @@ impl Technique for TiledForward {
     }
 
     fn predict(&self, workload: &Workload, params: &Params) -> Cost {
-        tiled_forward(&Workload { pixels_a_tile: division(params).most_pixels(), ..*workload })
+        cost::tiled_forward(&Workload { pixels_a_tile: division(params).most_pixels(), ..*workload })
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {

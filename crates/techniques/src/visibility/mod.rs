@@ -2,12 +2,14 @@
 
 // ORDER: 70
 
+pub mod cost;
+
 use afterlight_graph::{Graph, ImageHandle, Load, gpu::vk};
 
 use afterlight_shader::Shader;
 use afterlight_frame::{OpaqueDepth, Answers, AppendixA, Exactness, Frame, Info, Params, Source, SourceSlots, Technique, TechniqueError};
 use afterlight_stages::{lights::{cells::VisibleDepths, step::{LightStep, self}}, surfaces::{compute_raster, geometry, shade::add_volumes}};
-use afterlight_cost::{Cost, Workload, visibility_buffer};
+use afterlight_cost::{Cost, Workload};
 
 /// The technique.
 pub static TECHNIQUE: Visibility = Visibility;
@@ -56,7 +58,7 @@ impl Technique for Visibility {
     }
 
     fn predict(&self, workload: &Workload, _: &Params) -> Cost {
-        visibility_buffer(workload)
+        cost::visibility_buffer(workload)
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
@@ -77,7 +79,7 @@ impl Technique for Visibility {
         let depth = pass.depth(depth, Load::Clear(0.0));
         surfaces.draw(frame, &mut pass);
         pass.finish();
-        let radiance = shade(graph, frame, "", &SceneDraws::of_depth(&depth, 1), &|pass| {
+        let radiance = shade(graph, frame, "", &VisibleDepths::of_depth(&depth, 1), &|pass| {
             pass.read_image("ids", &ids);
         })?;
         frame.board.put(OpaqueDepth(depth));
@@ -88,7 +90,7 @@ impl Technique for Visibility {
 /// The same from triangles that compute has found.
 fn shade_keys(graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
     let keys = compute_raster::rasterize(graph, frame, &INFO, 1)?;
-    shade(graph, frame, "#keys", &SceneDraws::of_keys(&keys, 1), &|pass| {
+    shade(graph, frame, "#keys", &VisibleDepths::of_keys(&keys, 1), &|pass| {
         pass.constant("SAMPLES", 1);
         pass.read_buffer("SampleKeys", &keys);
         pass.read_buffer("DrawCommands", &frame.buffers.commands);
@@ -100,7 +102,7 @@ fn shade(
     graph: &mut Graph,
     frame: &Frame<'_>,
     tag: &str,
-    surfaces: &SceneDraws<'_>,
+    surfaces: &VisibleDepths<'_>,
     bind: &dyn Fn(&mut dyn SourceSlots),
 ) -> Result<ImageHandle, TechniqueError> {
     let step = LightStep::build(graph, frame, &INFO, surfaces)?;
