@@ -41,6 +41,7 @@ fn shader(file: &str) -> Shader {
         stage: stage_of(file).expect("a shader's extension"),
         path: folder.join(file),
         folder,
+        source: None,
         defines: Vec::new(),
     };
     Compiler::new().compile(&variant).expect("the shader compiles").shader

@@ -9,12 +9,14 @@
 //! ```
 //! and in the library `include!(concat!(env!("OUT_DIR"), "/shaders.rs"));`, which defines `SHADERS` and `shader(name)`.
 
-use std::fmt::Write as _;
+use std::cmp::Reverse;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
+use crate::cache::Cache;
 use crate::compile::{CompileError, Compiled, Compiler};
 use crate::manifest::{self, Variant};
-use crate::{Interface, Shader, StructLayout};
+use crate::{Shader, StructLayout, pack};
 
 /// Compiles the variants of several folders.
 #[derive(Clone, Debug, Default)]
@@ -29,7 +31,7 @@ impl Builder {
         Builder::default()
     }
 
-    /// Adds a folder that includes are looked up in after the including shader's own.
+    /// Adds a folder that includes and templates are looked up in; there may be several, see [`Compiler::include_dir`].
     pub fn include_dir(mut self, folder: impl Into<PathBuf>) -> Builder {
         self.compiler = self.compiler.include_dir(folder);
         self
@@ -47,6 +49,14 @@ impl Builder {
         self
     }
 
+    pub(crate) fn compiler(&self) -> &Compiler {
+        &self.compiler
+    }
+
+    pub(crate) fn folders(&self) -> &[(String, PathBuf)] {
+        &self.folders
+    }
+
     /// Returns every variant that the folders' manifests list.
     ///
     /// # Errors
@@ -54,7 +64,7 @@ impl Builder {
     pub fn variants(&self) -> Result<Vec<Variant>, CompileError> {
         let mut all = Vec::new();
         for (prefix, folder) in &self.folders {
-            all.extend(manifest::read(prefix, folder)?);
+            all.extend(manifest::read(prefix, folder, self.compiler.include_dirs())?);
         }
         Ok(all)
     }
@@ -64,146 +74,126 @@ impl Builder {
     /// # Errors
     /// Every [`CompileError`] that there is.
     pub fn compile(&self) -> Result<Vec<Compiled>, CompileError> {
-        let variants = self.variants()?;
-        let threads = std::thread::available_parallelism().map_or(1, usize::from).min(variants.len().max(1));
-        let next = std::sync::atomic::AtomicUsize::new(0);
-        let mut done: Vec<(usize, Result<Compiled, CompileError>)> = std::thread::scope(|scope| {
-            let workers: Vec<_> = (0..threads)
-                .map(|_| {
-                    scope.spawn(|| {
-                        let mut mine = Vec::new();
-                        loop {
-                            let index = next.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
-                            let Some(variant) = variants.get(index) else { return mine };
-                            mine.push((index, self.compiler.compile(variant)));
-                        }
-                    })
-                })
-                .collect();
-            workers
-                .into_iter()
-                .flat_map(|worker| worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
-                .collect()
-        });
-        done.sort_by_key(|(index, _)| *index);
-        let (mut compiled, mut errors) = (Vec::new(), Vec::new());
-        for (_, result) in done {
-            match result {
-                Ok(one) => compiled.push(one),
-                Err(error) => errors.push(error),
-            }
-        }
-        match errors.len() {
-            0 => Ok(compiled),
-            1 => Err(errors.remove(0)),
-            _ => Err(CompileError::Several(errors)),
-        }
+        compile_all(&self.variants()?, |variant| self.compiler.compile(variant))
     }
 
-    /// Compiles every variant and writes `shaders.rs`, with the SPIR-V beside it, into `out_dir`; tells Cargo which files
-    /// to watch. Where nothing that shaders are made of changed since the last time, what is there is left as it is.
+    /// Compiles every variant and writes `shaders.rs`, with the shaders beside it, into `out_dir`; tells Cargo which files
+    /// to watch. A variant of which nothing changed since the last time, neither its line, the files that it includes nor
+    /// the layouts, is taken as it was.
     ///
     /// # Errors
     /// Every [`CompileError`] that there is.
-    pub fn emit(&self, out_dir: impl AsRef<Path>) -> Result<(), CompileError> {
+    pub fn emit(&self, out_dir: impl AsRef<Path>) -> Result<Emitted, CompileError> {
         let folders = self.folders.iter().map(|(_, folder)| folder).chain(self.compiler.include_dirs());
         for folder in folders {
             // The whole folder: a header that did not compile, and one that is new, must start the build again too.
             println!("cargo:rerun-if-changed={}", folder.display());
         }
-        let (stamp_path, code_path) =
-            (out_dir.as_ref().join("shaders.stamp"), out_dir.as_ref().join("shaders.rs"));
-        let stamp =
-            self.compiler.fingerprint(self.folders.iter().map(|(_, folder)| folder.as_path())).to_string();
-        if code_path.is_file() && std::fs::read_to_string(&stamp_path).is_ok_and(|written| written == stamp) {
-            return Ok(());
-        }
-        write_shaders(&self.compile()?, out_dir.as_ref())?;
-        write(stamp_path, stamp.as_bytes())
+        let out_dir = out_dir.as_ref();
+        let variants = self.variants()?;
+        let cache = Cache::open(out_dir.join("shader_cache"), &self.compiler)?;
+        let compiled_count = AtomicUsize::new(0);
+        let compiled = compile_all(&variants, |variant| {
+            cache.get(variant).map_or_else(
+                || {
+                    compiled_count.fetch_add(1, Ordering::Relaxed);
+                    cache.compile(variant)
+                },
+                Ok,
+            )
+        })?;
+        cache.keep_only(&variants);
+        write_shaders(&compiled, out_dir)?;
+        Ok(Emitted { variant_count: variants.len(), compiled_count: compiled_count.into_inner() })
     }
 }
 
-fn write(path: PathBuf, bytes: &[u8]) -> Result<(), CompileError> {
-    std::fs::write(&path, bytes).map_err(|source| CompileError::Write { path, source })
+/// What [`Builder::emit`] had to do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Emitted {
+    /// Variants in the manifests.
+    pub variant_count: usize,
+    /// Variants that were compiled; the others were as they are from the last time.
+    pub compiled_count: usize,
 }
+
+/// Calls `compile` for every variant, on every core, and returns the results in the variants' order.
+fn compile_all(
+    variants: &[Variant],
+    compile: impl Fn(&Variant) -> Result<Compiled, CompileError> + Sync,
+) -> Result<Vec<Compiled>, CompileError> {
+    let threads = std::thread::available_parallelism().map_or(1, usize::from).min(variants.len().max(1));
+    let order = largest_first(variants);
+    let next = AtomicUsize::new(0);
+    let work = || {
+        let mut mine = Vec::new();
+        while let Some(&index) = order.get(next.fetch_add(1, Ordering::Relaxed)) {
+            mine.push((index, compile(&variants[index])));
+        }
+        mine
+    };
+    let mut done: Vec<(usize, Result<Compiled, CompileError>)> = std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..threads).map(|_| scope.spawn(work)).collect();
+        workers
+            .into_iter()
+            .flat_map(|worker| worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+            .collect()
+    });
+    done.sort_by_key(|(index, _)| *index);
+    let (mut compiled, mut errors) = (Vec::new(), Vec::new());
+    for (_, result) in done {
+        match result {
+            Ok(one) => compiled.push(one),
+            Err(error) => errors.push(error),
+        }
+    }
+    match errors.len() {
+        0 => Ok(compiled),
+        1 => Err(errors.remove(0)),
+        _ => Err(CompileError::Several(errors)),
+    }
+}
+
+/// Returns the variants' indices by the lengths of their files: one that takes long and starts last leaves cores idle.
+fn largest_first(variants: &[Variant]) -> Vec<usize> {
+    let bytes = |path: &PathBuf| std::fs::metadata(path).map_or(0, |metadata| metadata.len());
+    let mut order: Vec<usize> = (0..variants.len()).collect();
+    order.sort_by_cached_key(|&index| {
+        let variant = &variants[index];
+        Reverse(bytes(&variant.path) + variant.source.as_ref().map_or(0, bytes))
+    });
+    order
+}
+
+const PACKED_NAME: &str = "shaders.bin";
+
+/// What `shaders.rs` says; the shaders themselves are in the file beside it.
+const CODE: &str = "\
+/// Every compiled variant of this crate's shaders.
+pub static SHADERS: ::std::sync::LazyLock<::std::vec::Vec<::afterlight_shader::Shader>> =
+    ::std::sync::LazyLock::new(|| {
+        match ::afterlight_shader::pack::unpack(include_bytes!(concat!(env!(\"OUT_DIR\"), \"/shaders.bin\"))) {
+            ::std::result::Result::Ok(shaders) => shaders,
+            ::std::result::Result::Err(error) => ::std::panic!(\"the shaders of this build: {error}\"),
+        }
+    });
+
+/// Returns the variant of that name, `folder/FILE` or `folder/FILE#TAG`.
+pub fn shader(name: &str) -> ::std::option::Option<&'static ::afterlight_shader::Shader> {
+    SHADERS.iter().find(|shader| &*shader.name == name)
+}
+";
 
 fn write_shaders(compiled: &[Compiled], out_dir: &Path) -> Result<(), CompileError> {
-    let mut code = String::from(
-        "/// Every compiled variant of this crate's shaders.\n\
-         pub static SHADERS: ::std::sync::LazyLock<::std::vec::Vec<::afterlight_shader::Shader>> =\n    \
-         ::std::sync::LazyLock::new(|| {\n        use ::afterlight_shader::*;\n        ::std::vec![\n",
-    );
-    for (index, one) in compiled.iter().enumerate() {
-        let file = format!("shader_{index}.spv");
-        let bytes: Vec<u8> = one.shader.spirv.iter().flat_map(|word| word.to_le_bytes()).collect();
-        write(out_dir.join(&file), &bytes)?;
-        push_shader(&mut code, &one.shader, &file);
-    }
-    code.push_str(
-        "        ]\n    });\n\n\
-         /// Returns the variant of that name, `folder/FILE` or `folder/FILE#TAG`.\n\
-         pub fn shader(name: &str) -> ::std::option::Option<&'static ::afterlight_shader::Shader> {\n    \
-         SHADERS.iter().find(|shader| &*shader.name == name)\n}\n",
-    );
-    write(out_dir.join("shaders.rs"), code.as_bytes())
+    let shaders: Vec<&Shader> = compiled.iter().map(|one| &one.shader).collect();
+    write_if_new(out_dir.join(PACKED_NAME), &pack::pack(&shaders))?;
+    write_if_new(out_dir.join("shaders.rs"), CODE.as_bytes())
 }
 
-/// Appends a `Shader { … }` expression.
-fn push_shader(code: &mut String, shader: &Shader, file: &str) {
-    let reflection = &shader.reflection;
-    let _ = writeln!(
-        code,
-        "            Shader {{ name: Text::Static({:?}), stage: Stage::{:?}, spirv: words_of(include_bytes!(concat!(env!(\"OUT_DIR\"), \"/{file}\"))), reflection: Reflection {{",
-        shader.name, shader.stage
-    );
-    code.push_str("                bindings: Shared::Static(&[");
-    for binding in &reflection.bindings {
-        let image = match binding.image {
-            None => "None".to_owned(),
-            Some(shape) => format!(
-                "Some(ImageShape {{ dim: ImageDim::{:?}, arrayed: {}, multisampled: {} }})",
-                shape.dim, shape.arrayed, shape.multisampled
-            ),
-        };
-        let _ = write!(
-            code,
-            "Binding {{ set: {}, binding: {}, name: Text::Static({:?}), kind: BindingKind::{:?}, count: {}, readable: {}, writable: {}, image: {image} }}, ",
-            binding.set,
-            binding.binding,
-            binding.name,
-            binding.kind,
-            binding.count,
-            binding.readable,
-            binding.writable
-        );
+/// Writes a file unless it has these bytes: Cargo builds again what includes a file that is newer.
+fn write_if_new(path: PathBuf, bytes: &[u8]) -> Result<(), CompileError> {
+    if std::fs::read(&path).is_ok_and(|there| there == bytes) {
+        return Ok(());
     }
-    let _ = write!(
-        code,
-        "]),\n                push_constant_bytes: {}, local_size: {:?},\n                spec_constants: Shared::Static(&[",
-        reflection.push_constant_bytes, reflection.local_size
-    );
-    for constant in &reflection.spec_constants {
-        let _ = write!(
-            code,
-            "SpecConstant {{ id: {}, name: Text::Static({:?}), scalar: Scalar::{:?}, default_bits: {} }}, ",
-            constant.id, constant.name, constant.scalar, constant.default_bits
-        );
-    }
-    let _ = write!(
-        code,
-        "]),\n                inputs: Shared::Static(&[{}]), outputs: Shared::Static(&[{}]) }} }},\n",
-        interfaces(&reflection.inputs),
-        interfaces(&reflection.outputs)
-    );
-}
-
-fn interfaces(list: &[Interface]) -> String {
-    list.iter()
-        .map(|one| {
-            format!(
-                "Interface {{ location: {}, name: Text::Static({:?}), components: {}, scalar: Scalar::{:?} }}, ",
-                one.location, one.name, one.components, one.scalar
-            )
-        })
-        .collect()
+    std::fs::write(&path, bytes).map_err(|source| CompileError::Write { path, source })
 }

@@ -1,19 +1,19 @@
 //! Compiles one variant: includes, glslang, removal of unused descriptors, reflection, struct check.
 
-use std::collections::{BTreeSet, HashMap, HashSet};
+use std::collections::HashMap;
 use std::fmt;
-use std::hash::{DefaultHasher, Hash, Hasher};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use glslang::include::{IncludeHandler, IncludeResult, IncludeType};
 use glslang::{
     Compiler as Glslang, CompilerOptions, GlslProfile, ShaderInput, ShaderMessage, ShaderSource, ShaderStage,
     SourceLanguage, SpirvVersion, Target, VulkanVersion,
 };
 
+pub use crate::lookup::Files;
+use crate::lookup::{Includer, display_path};
 use crate::manifest::{ManifestError, Variant};
 use crate::reflect::{self, ReflectError, StructInMemory};
-use crate::{INCLUDES, Shader, Stage, StructLayout};
+use crate::{Shader, Stage, StructLayout};
 
 /// Lines that every shader starts with, after its `#version`.
 const PREAMBLE: &str =
@@ -104,13 +104,14 @@ fn lines(messages: &[Diagnostic]) -> String {
 pub struct Compiled {
     /// The shader.
     pub shader: Shader,
-    /// Every file on disk that it was made of.
-    pub dependencies: BTreeSet<PathBuf>,
+    /// The files that decided it.
+    pub files: Files,
 }
 
 /// Compiles variants.
 #[derive(Clone, Debug, Default)]
 pub struct Compiler {
+    override_dirs: Vec<PathBuf>,
     include_dirs: Vec<PathBuf>,
     layouts: Vec<StructLayout>,
 }
@@ -121,9 +122,20 @@ impl Compiler {
         Compiler::default()
     }
 
-    /// Adds a folder that includes are looked up in, after the variant's own folder and before this crate's headers.
+    /// Adds a folder that includes and templates are looked up in. There may be several; no two of them may have a file
+    /// of the same name, nor of the name of one of this crate's headers, where a shader includes it.
     pub fn include_dir(mut self, folder: impl Into<PathBuf>) -> Compiler {
-        self.include_dirs.push(folder.into());
+        let folder = folder.into();
+        if !self.include_dirs.contains(&folder) {
+            self.include_dirs.push(folder);
+        }
+        self
+    }
+
+    /// Adds a folder whose files come before those of the include folders and this crate's headers, for trying what a
+    /// shader does with another header of the same name.
+    pub fn override_dir(mut self, folder: impl Into<PathBuf>) -> Compiler {
+        self.override_dirs.push(folder.into());
         self
     }
 
@@ -137,70 +149,63 @@ impl Compiler {
         &self.include_dirs
     }
 
-    /// Returns a number that changes with anything that compiled shaders depend on: this crate's headers, the layouts, the
-    /// program that runs, and every file of `folders` and of the include folders that is not Rust.
-    pub(crate) fn fingerprint<'a>(&'a self, folders: impl Iterator<Item = &'a Path>) -> u64 {
-        let mut hasher = DefaultHasher::new();
-        INCLUDES.hash(&mut hasher);
-        format!("{:?}", self.layouts).hash(&mut hasher);
-        let program =
-            std::env::current_exe().and_then(std::fs::metadata).and_then(|metadata| metadata.modified());
-        format!("{program:?}").hash(&mut hasher);
-        for folder in folders.chain(self.include_dirs.iter().map(PathBuf::as_path)) {
-            hash_folder(folder, &mut hasher);
-        }
-        hasher.finish()
-    }
-
     /// Compiles a variant's file.
     ///
     /// # Errors
     /// [`CompileError`]; messages of the compiler carry file and line.
     pub fn compile(&self, variant: &Variant) -> Result<Compiled, CompileError> {
+        let (files, shader) = self.compile_telling_files(variant);
+        Ok(Compiled { shader: shader?, files })
+    }
+
+    /// Compiles a variant's file; tells what it was made of also where it does not compile.
+    pub(crate) fn compile_telling_files(&self, variant: &Variant) -> (Files, Result<Shader, CompileError>) {
+        let mut includer = Includer::new(variant, &self.override_dirs, &self.include_dirs);
+        let shader = self.compile_with(variant, &mut includer);
+        (includer.files, shader)
+    }
+
+    fn compile_with(&self, variant: &Variant, includer: &mut Includer) -> Result<Shader, CompileError> {
         let source = std::fs::read_to_string(&variant.path)
             .map_err(|source| CompileError::Read { path: variant.path.clone(), source })?;
-        let mut includer = Includer::new(variant, &self.include_dirs);
-        let spirv = to_spirv(variant, &source, &mut includer)?;
+        let spirv = to_spirv(variant, &source, includer)?;
         let reflect_error = |source| CompileError::Reflect { variant: variant.name.clone(), source };
         let spirv = reflect::strip_unused(&spirv).map_err(reflect_error)?;
         let structs = reflect::structs_in_memory(&spirv).map_err(reflect_error)?;
         check_layouts(&variant.name, &structs, &self.layouts)?;
         let reflection = reflect::reflect(&spirv).map_err(reflect_error)?;
-        let shader = Shader {
-            name: variant.name.as_str().into(),
-            stage: variant.stage,
-            spirv: spirv.into(),
-            reflection,
-        };
-        Ok(Compiled { shader, dependencies: includer.dependencies })
-    }
-}
-
-fn hash_folder(folder: &Path, hasher: &mut DefaultHasher) {
-    let mut paths: Vec<PathBuf> =
-        std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path()).collect();
-    paths.sort();
-    for path in paths {
-        if path.is_dir() {
-            hash_folder(&path, hasher);
-        } else if path.extension().is_none_or(|extension| extension != "rs") {
-            path.hash(hasher);
-            std::fs::read(&path).ok().hash(hasher);
-        }
+        let name = variant.name.as_str().into();
+        Ok(Shader { name, stage: variant.stage, spirv: spirv.into(), reflection })
     }
 }
 
 fn to_spirv(variant: &Variant, source: &str, includer: &mut Includer) -> Result<Vec<u32>, CompileError> {
-    let file = display_path(&variant.path);
-    let glsl_error = |log: String| CompileError::Glsl {
-        variant: variant.name.clone(),
-        messages: diagnostics(&log, &file),
-    };
+    let glsl = glsl_to_spirv(variant, source, includer);
+    glsl.map_err(|failure| match failure {
+        Failure::NoCompiler => CompileError::NoCompiler,
+        Failure::Log(log) => {
+            let mut messages = diagnostics(&log, &display_path(&variant.path));
+            explain_includes(&mut messages, &includer.failures);
+            CompileError::Glsl { variant: variant.name.clone(), messages }
+        }
+    })
+}
+
+enum Failure {
+    NoCompiler,
+    /// The compiler's log.
+    Log(String),
+}
+
+fn glsl_to_spirv(variant: &Variant, source: &str, includer: &mut Includer) -> Result<Vec<u32>, Failure> {
+    fn log(error: impl fmt::Display) -> Failure {
+        Failure::Log(error.to_string())
+    }
     if let Some(at) = source.find('\0') {
         let line = source[..at].lines().count();
-        return Err(glsl_error(format!("ERROR: 0:{line}: found a zero byte, expected GLSL text")));
+        return Err(log(format_args!("ERROR: 0:{line}: found a zero byte, expected GLSL text")));
     }
-    let compiler = Glslang::acquire().ok_or(CompileError::NoCompiler)?;
+    let compiler = Glslang::acquire().ok_or(Failure::NoCompiler)?;
     let text = ShaderSource::from(with_preamble(source, &variant.defines));
     let options = CompilerOptions {
         source_language: SourceLanguage::GLSL,
@@ -211,10 +216,19 @@ fn to_spirv(variant: &Variant, source: &str, includer: &mut Includer) -> Result<
     };
     let stage = glslang_stage(variant.stage);
     let input = ShaderInput::new(&text, stage, &options, None::<&[(&str, Option<&str>)]>, Some(includer))
-        .map_err(|error| glsl_error(error.to_string()))?;
-    let shader =
-        glslang::Shader::new(compiler, input).parse().map_err(|error| glsl_error(error.to_string()))?;
-    shader.compile().map_err(|error| glsl_error(error.to_string()))
+        .map_err(log)?;
+    let shader = glslang::Shader::new(compiler, input).parse().map_err(log)?;
+    shader.compile().map_err(log)
+}
+
+/// Puts the reason why an include failed in the place of the compiler's bare complaint.
+fn explain_includes(messages: &mut [Diagnostic], failures: &HashMap<String, String>) {
+    for message in messages {
+        let header = message.text.rsplit_once("header name: ").map(|(_, header)| header.trim());
+        if let Some(why) = header.and_then(|header| failures.get(header)) {
+            message.text.clone_from(why);
+        }
+    }
 }
 
 /// Puts the preamble and the macros after the `#version` line (which is added where it lacks) without moving the numbers
@@ -253,10 +267,6 @@ fn glslang_stage(stage: Stage) -> ShaderStage {
     }
 }
 
-fn display_path(path: &Path) -> String {
-    path.to_string_lossy().replace('\\', "/")
-}
-
 /// Reads `ERROR: FILE:LINE: TEXT` lines; `root` is the file that the compiler calls `0`.
 fn diagnostics(log: &str, root: &str) -> Vec<Diagnostic> {
     let mut messages = Vec::new();
@@ -288,81 +298,6 @@ fn diagnostic(rest: &str, root: &str) -> Diagnostic {
         }
     }
     Diagnostic { file: root.to_owned(), line: 0, text: rest.trim().to_owned() }
-}
-
-/// Finds included files: beside the including file, in the variant's folder, in the include folders, among this crate's
-/// headers. A file with `#pragma once` is given once a compilation.
-struct Includer<'a> {
-    folder: &'a Path,
-    include_dirs: &'a [PathBuf],
-    /// Folder of each file by the name that the compiler knows it by; the main file's is "".
-    folders: HashMap<String, PathBuf>,
-    once: HashSet<String>,
-    dependencies: BTreeSet<PathBuf>,
-}
-
-impl<'a> Includer<'a> {
-    fn new(variant: &'a Variant, include_dirs: &'a [PathBuf]) -> Includer<'a> {
-        let parent = variant.path.parent().map(Path::to_owned).unwrap_or_default();
-        Includer {
-            folder: &variant.folder,
-            include_dirs,
-            folders: HashMap::from([(String::new(), parent)]),
-            once: HashSet::new(),
-            dependencies: BTreeSet::from([variant.path.clone()]),
-        }
-    }
-
-    fn find(&self, header: &str, includer: &str) -> Option<(String, Option<PathBuf>, String)> {
-        let beside = self.folders.get(includer).map(PathBuf::as_path);
-        let candidates =
-            beside.into_iter().chain([self.folder]).chain(self.include_dirs.iter().map(PathBuf::as_path));
-        for folder in candidates {
-            let path = folder.join(header);
-            if let Ok(text) = std::fs::read_to_string(&path) {
-                return Some((display_path(&path), Some(path), text));
-            }
-        }
-        // A header of this crate may include its neighbour by its bare name.
-        let within = includer.strip_prefix(EMBEDDED).and_then(|name| name.rsplit_once('/'));
-        let neighbour = within.map(|(folder, _)| format!("{folder}/{header}"));
-        let (name, text) = INCLUDES
-            .iter()
-            .find(|(name, _)| Some(*name) == neighbour.as_deref())
-            .or_else(|| INCLUDES.iter().find(|(name, _)| *name == header))?;
-        Some((format!("{EMBEDDED}{name}"), None, (*text).to_owned()))
-    }
-}
-
-/// What names of this crate's headers start with in messages.
-const EMBEDDED: &str = "include/";
-
-impl IncludeHandler for Includer<'_> {
-    fn include(
-        &mut self,
-        _kind: IncludeType,
-        header_name: &str,
-        includer_name: &str,
-        _include_depth: usize,
-    ) -> Option<IncludeResult> {
-        let (name, path, text) = self.find(header_name, includer_name)?;
-        if let Some(path) = path {
-            self.folders.insert(name.clone(), path.parent().map(Path::to_owned).unwrap_or_default());
-            self.dependencies.insert(path);
-        }
-        let data = match once(&text) {
-            None => text,
-            Some(_) if !self.once.insert(name.clone()) => String::new(),
-            Some(without) => without,
-        };
-        Some(IncludeResult { name, data })
-    }
-}
-
-/// Returns the text without its `#pragma once` line (glslang does not know it), or none where it has none.
-fn once(text: &str) -> Option<String> {
-    let line = text.lines().find(|line| line.trim() == "#pragma once")?;
-    Some(text.replacen(line, "", 1))
 }
 
 fn check_layouts(

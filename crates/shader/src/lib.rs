@@ -8,11 +8,16 @@
 #[cfg(feature = "compile")]
 pub mod build;
 #[cfg(feature = "compile")]
+mod cache;
+#[cfg(feature = "compile")]
 pub mod compile;
 mod include;
 pub mod layout;
 #[cfg(feature = "compile")]
+mod lookup;
+#[cfg(feature = "compile")]
 pub mod manifest;
+pub mod pack;
 pub mod reflect;
 #[cfg(feature = "compile")]
 pub mod reload;

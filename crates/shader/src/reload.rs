@@ -1,12 +1,13 @@
 //! Compiles shaders again when their files change.
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
+use crate::Shader;
 use crate::build::Builder;
-use crate::compile::CompileError;
-use crate::{Shader, StructLayout, compile::Compiler, manifest};
+use crate::compile::{CompileError, Files};
+use crate::manifest::{self, Variant};
 
 /// What became of a variant whose files changed.
 #[derive(Clone, Debug)]
@@ -24,13 +25,30 @@ pub enum Changed {
 
 /// Watches folders of shaders by their files' times of change and lengths.
 pub struct Reloader {
-    folders: Vec<(String, PathBuf)>,
-    compiler: Compiler,
-    /// Files that a variant was made of, as they were when it was last compiled.
-    seen: HashMap<String, HashMap<PathBuf, Stamp>>,
+    builder: Builder,
+    /// Each variant as it was when it was last compiled.
+    seen: HashMap<String, Seen>,
     failed_manifests: HashMap<PathBuf, Stamp>,
 }
 
+/// A variant and the files that decided it, those too whose absence did.
+struct Seen {
+    variant: Variant,
+    files: HashMap<PathBuf, Stamp>,
+}
+
+impl Seen {
+    fn new(variant: &Variant, files: &Files) -> Seen {
+        let paths = files.read.iter().chain(&files.absent);
+        Seen { variant: variant.clone(), files: paths.map(|path| (path.clone(), stamp(path))).collect() }
+    }
+
+    fn is_current(&self, variant: &Variant) -> bool {
+        self.variant == *variant && self.files.iter().all(|(path, seen)| stamp(path) == *seen)
+    }
+}
+
+/// Time of change and length of a file; none where it does not exist.
 type Stamp = Option<(SystemTime, u64)>;
 
 fn stamp(path: &Path) -> Stamp {
@@ -38,38 +56,26 @@ fn stamp(path: &Path) -> Stamp {
     Some((metadata.modified().ok()?, metadata.len()))
 }
 
-fn stamps(paths: &BTreeSet<PathBuf>) -> HashMap<PathBuf, Stamp> {
-    paths.iter().map(|path| (path.clone(), stamp(path))).collect()
-}
-
 impl Reloader {
-    /// Watches `folders` (prefix and path); compiles each variant once to learn its files.
+    /// Watches the builder's folders, with its include folders and layouts; compiles each variant once to learn its files.
     ///
     /// # Errors
     /// The first [`CompileError`]: what is watched must compile to begin with.
-    pub fn new(folders: &[(String, PathBuf)], layouts: &[StructLayout]) -> Result<Reloader, CompileError> {
-        let mut builder = Builder::new().layouts(layouts);
-        for (prefix, folder) in folders {
-            builder = builder.folder(prefix, folder);
-        }
-        let seen = builder
-            .compile()?
-            .into_iter()
-            .map(|one| (one.shader.name.to_string(), stamps(&one.dependencies)))
+    pub fn new(builder: Builder) -> Result<Reloader, CompileError> {
+        let variants = builder.variants()?;
+        let seen = variants
+            .iter()
+            .zip(builder.compile()?)
+            .map(|(variant, compiled)| (variant.name.clone(), Seen::new(variant, &compiled.files)))
             .collect();
-        Ok(Reloader {
-            folders: folders.to_vec(),
-            compiler: Compiler::new().layouts(layouts),
-            seen,
-            failed_manifests: HashMap::new(),
-        })
+        Ok(Reloader { builder, seen, failed_manifests: HashMap::new() })
     }
 
     /// Compiles what changed since the last call, variants that are new in a manifest too.
     pub fn poll(&mut self) -> Vec<Changed> {
         let mut changes = Vec::new();
-        for (prefix, folder) in self.folders.clone() {
-            match manifest::read(&prefix, &folder) {
+        for (prefix, folder) in self.builder.folders().to_vec() {
+            match manifest::read(&prefix, &folder, self.builder.compiler().include_dirs()) {
                 Ok(variants) => {
                     self.failed_manifests.remove(&folder);
                     changes.extend(variants.iter().filter_map(|variant| self.poll_variant(variant)));
@@ -85,26 +91,15 @@ impl Reloader {
         changes
     }
 
-    fn poll_variant(&mut self, variant: &manifest::Variant) -> Option<Changed> {
-        if let Some(files) = self.seen.get(&variant.name)
-            && files.iter().all(|(path, seen)| stamp(path) == *seen)
-        {
+    fn poll_variant(&mut self, variant: &Variant) -> Option<Changed> {
+        if self.seen.get(&variant.name).is_some_and(|seen| seen.is_current(variant)) {
             return None;
         }
-        match self.compiler.compile(variant) {
-            Ok(compiled) => {
-                self.seen.insert(variant.name.clone(), stamps(&compiled.dependencies));
-                Some(Changed::Compiled(compiled.shader))
-            }
-            Err(error) => {
-                // The files known so far are watched on: any of them may hold the cure.
-                let files = self.seen.entry(variant.name.clone()).or_default();
-                files.entry(variant.path.clone()).or_default();
-                for (path, seen) in files.iter_mut() {
-                    *seen = stamp(path);
-                }
-                Some(Changed::Failed { name: variant.name.clone(), message: error.to_string() })
-            }
-        }
+        let (files, shader) = self.builder.compiler().compile_telling_files(variant);
+        self.seen.insert(variant.name.clone(), Seen::new(variant, &files));
+        Some(match shader {
+            Ok(shader) => Changed::Compiled(shader),
+            Err(error) => Changed::Failed { name: variant.name.clone(), message: error.to_string() },
+        })
     }
 }

@@ -2,10 +2,10 @@
 #![cfg(feature = "compile")]
 
 use std::fs;
-use std::path::Path;
 
 use afterlight_shader::build::Builder;
 use afterlight_shader::compile::{CompileError, Compiled};
+use afterlight_shader::pack::{pack, unpack, unpack_owned};
 use afterlight_shader::reload::{Changed, Reloader};
 use afterlight_shader::{
     BindingKind, FieldLayout, ImageDim, ImageShape, Reflection, Scalar, Stage, StructLayout, shader_struct,
@@ -180,7 +180,8 @@ fn includes_resolve_beside_then_in_the_folder_then_in_this_crate() {
     )
     .expect("compiles");
     let files: Vec<_> = compiled[0]
-        .dependencies
+        .files
+        .read
         .iter()
         .map(|path| path.file_name().expect("a name").to_string_lossy().into_owned())
         .collect();
@@ -236,6 +237,188 @@ fn wrong_manifests_are_told_by_line() {
     assert!(error.contains("absent.comp: "), "{error}");
 }
 
+/// A stage's folder with two templates, and a technique's folder that uses them.
+const STAGES: &[(&str, &str)] = &[
+    (
+        "stage/shade.comp.glsl",
+        "#version 460\n#include \"near.glsl\"\n#include \"source\"\n#include \"source\"\nlayout(local_size_x = SIZE) in;\n\
+         void main() { surface(); near(); }\n",
+    ),
+    ("stage/volume.frag.glsl", "#version 460\n#include \"source\"\nvoid main() { surface(); }\n"),
+    ("stage/near.glsl", "void near() {}\n"),
+    ("stage/common.glsl", "void common_part() {}\n"),
+];
+const SOURCE: &str = "#pragma once\n#include \"stage/common.glsl\"\n#ifndef SIZE\n#define SIZE 1\n#endif\nvoid surface() { common_part(); }\n";
+
+/// Compiles the technique `mine` with the include folders `stages` and `techniques` of one temporary folder.
+fn compile_mine(files: &[(&str, &str)]) -> Result<Vec<Compiled>, CompileError> {
+    let (stages, techniques) = (folder(STAGES), folder(files));
+    builder_of_mine(&stages, &techniques).compile()
+}
+
+fn builder_of_mine(stages: &TempDir, techniques: &TempDir) -> Builder {
+    Builder::new()
+        .include_dir(stages.path())
+        .include_dir(techniques.path())
+        .folder("mine", techniques.path().join("mine"))
+}
+
+#[test]
+fn a_template_takes_each_users_source() {
+    let manifest = "\
+        template stage/shade.comp.glsl stage/volume.frag.glsl source=source_mine.glsl #base EXTRA\n\
+        \n  axis - | #refs REFERENCES | #keys KEYS=2   # what an ID is\n\
+        # a comment within\n  axis - | #one SIZE=4\n  without #keys #one\n\
+        own.comp #plain\n\
+        template stage/shade.comp.glsl source=other/source.glsl\n";
+    let compiled = compile_mine(&[
+        ("mine/variants.txt", manifest),
+        ("mine/source_mine.glsl", SOURCE),
+        ("mine/near.glsl", "#error a template's include is beside the template\n"),
+        ("mine/own.comp", "#version 460\nlayout(local_size_x = 2) in;\nvoid main() {}\n"),
+        ("other/source.glsl", "#pragma once\n#define SIZE 8\nvoid surface() {}\n"),
+    ])
+    .unwrap_or_else(|error| panic!("{error}"));
+    let sizes: Vec<_> =
+        compiled.iter().map(|one| (one.shader.name.as_str(), one.shader.reflection.local_size[0])).collect();
+    assert_eq!(
+        sizes,
+        [
+            ("mine/shade.comp#base", 1),
+            ("mine/shade.comp#base-one", 4),
+            ("mine/shade.comp#base-refs", 1),
+            ("mine/shade.comp#base-refs-one", 4),
+            ("mine/shade.comp#base-keys", 1),
+            ("mine/volume.frag#base", 1),
+            ("mine/volume.frag#base-one", 1),
+            ("mine/volume.frag#base-refs", 1),
+            ("mine/volume.frag#base-refs-one", 1),
+            ("mine/volume.frag#base-keys", 1),
+            ("mine/own.comp#plain", 2),
+            ("mine/shade.comp", 8),
+        ]
+    );
+}
+
+#[test]
+fn wrong_templates_are_told_by_line() {
+    let file = "template stage/shade.comp.glsl source=source.glsl";
+    for (manifest, expected) in [
+        (
+            "template stage/shade.comp.glsl",
+            "variants.txt:1: found `template stage/shade.comp.glsl` without a source",
+        ),
+        ("template source=source.glsl", "variants.txt:1: found no template before `source=`"),
+        (
+            "\ntemplate stage/absent.comp source=source.glsl",
+            "variants.txt:2: found no template `stage/absent.comp`",
+        ),
+        (
+            "template stage/near.glsl source=source.glsl",
+            "found file `stage/near.glsl`, expected one that ends in",
+        ),
+        (
+            "template stage/shade.comp.glsl source=absent.glsl",
+            "found no source `absent.glsl`, expected a file of ",
+        ),
+        (
+            "own.comp source=source.glsl",
+            "found `source=source.glsl`, expected it once and on a `template` line",
+        ),
+        ("own.comp\naxis - | #one ONE", "variants.txt:2: found `axis`, expected a `template` line above it"),
+        ("without #one #two", "found `without`, expected a `template` line above it"),
+        (&format!("{file}\naxis #a | "), "variants.txt:2: found an empty option"),
+        (&format!("{file}\naxis #a | #b\naxis #a | -"), "variants.txt:3: found `#a` a second time"),
+        (&format!("{file}\naxis - | X"), "found two options without a tag"),
+        (&format!("{file}\naxis - | #a 1X"), "found `1X`, expected NAME or NAME=VALUE"),
+        (
+            &format!("{file}\naxis - | #a\nwithout #a #b"),
+            "variants.txt:3: found `#b`, expected a #TAG of an axis",
+        ),
+        (&format!("{file}\naxis #a | #b\nwithout #a #b"), "expected tags of different axes"),
+        (&format!("{file}\naxis - | #a\nwithout #a"), "found 1 tag(s) after `without`"),
+        (&format!("{file}\n{file}"), "variants.txt:2: found `mine/shade.comp` a second time"),
+    ] {
+        let error = compile_mine(&[("mine/variants.txt", manifest), ("mine/source.glsl", SOURCE)])
+            .expect_err("is wrong")
+            .to_string();
+        assert!(error.contains(expected), "expected `{expected}` in: {error}");
+    }
+}
+
+#[test]
+fn includes_that_lead_nowhere_or_to_two_files_are_explained() {
+    const OWN: &str = "#version 460\n#include \"HEADER\"\nlayout(local_size_x = 2) in;\nvoid main() {}\n";
+    let (embedded, _) = afterlight_shader::INCLUDES.first().expect("headers are embedded");
+    for (header, expected) in [
+        ("source", "mine/own.comp:2: found `#include \"source\"` in `mine/own.comp`, which has no source"),
+        ("absent.glsl", "mine/own.comp:2: found no file `absent.glsl`, expected it beside"),
+        ("stage/common.glsl", "mine/own.comp:2: found `stage/common.glsl` twice, "),
+        (*embedded, "twice, "),
+        ("zero.glsl", "zero.glsl: found a zero byte"),
+    ] {
+        let files = [
+            ("mine/variants.txt", "own.comp"),
+            ("mine/own.comp", &OWN.replace("HEADER", header)),
+            ("mine/zero.glsl", "\0"),
+            ("stage/common.glsl", ""),
+            (*embedded, ""),
+        ];
+        let error = compile_mine(&files).expect_err("is wrong").to_string();
+        assert!(error.contains(expected), "expected `{expected}` in: {error}");
+    }
+    let (stages, techniques) = (
+        folder(STAGES),
+        folder(&[
+            ("mine/variants.txt", "own.comp"),
+            ("mine/own.comp", &OWN.replace("HEADER", "stage/common.glsl")),
+        ]),
+    );
+    builder_of_mine(&stages, &techniques)
+        .include_dir(stages.path().join("."))
+        .compile()
+        .expect("one folder twice");
+}
+
+#[test]
+fn reload_sees_sources_and_files_that_come_between() {
+    let (stages, techniques) = (
+        folder(STAGES),
+        folder(&[
+            (
+                "mine/variants.txt",
+                "template stage/shade.comp.glsl source=source.glsl\n  axis - | #two SIZE=2",
+            ),
+            ("mine/source.glsl", SOURCE),
+        ]),
+    );
+    let mut reloader = Reloader::new(builder_of_mine(&stages, &techniques)).expect("compiles");
+    assert!(reloader.poll().is_empty());
+    let write = |name: &str, text: &str| fs::write(techniques.path().join(name), text).expect("written");
+    let names = |changes: Vec<Changed>| -> Vec<String> {
+        changes
+            .into_iter()
+            .map(|change| match change {
+                Changed::Compiled(shader) => shader.name.to_string(),
+                Changed::Failed { message, .. } => message,
+            })
+            .collect()
+    };
+    write("mine/source.glsl", &SOURCE.replace("SIZE 1", "SIZE 16"));
+    assert_eq!(names(reloader.poll()), ["mine/shade.comp", "mine/shade.comp#two"]);
+    // A macro of one variant.
+    write("mine/variants.txt", "template stage/shade.comp.glsl source=source.glsl\n  axis - | #two SIZE=3");
+    assert_eq!(names(reloader.poll()), ["mine/shade.comp#two"]);
+    // A file that did not exist makes a name ambiguous, until it goes again.
+    fs::create_dir(techniques.path().join("stage")).expect("made");
+    write("stage/common.glsl", "");
+    assert!(names(reloader.poll()).iter().all(|message| message.contains("found `stage/common.glsl` twice")));
+    assert!(reloader.poll().is_empty());
+    fs::remove_file(techniques.path().join("stage/common.glsl")).expect("removed");
+    assert_eq!(names(reloader.poll()).len(), 2);
+    assert!(reloader.poll().is_empty());
+}
+
 #[test]
 fn structs_must_lie_as_in_rust() {
     let shader = |declaration: &str, layout: &str| {
@@ -280,8 +463,7 @@ fn reload_tells_changes_and_keeps_the_old_on_errors() {
     const GOOD: &str =
         "#version 460\n#include \"part.glsl\"\nlayout(local_size_x = 4) in;\nvoid main() { part(); }\n";
     let folder = folder(&[("variants.txt", "a.comp"), ("a.comp", GOOD), ("part.glsl", "void part() {}\n")]);
-    let folders = [("t".to_owned(), folder.path().to_owned())];
-    let mut reloader = Reloader::new(&folders, &[]).expect("compiles");
+    let mut reloader = Reloader::new(Builder::new().folder("t", folder.path())).expect("compiles");
     assert!(reloader.poll().is_empty());
     let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).expect("written");
 
@@ -317,10 +499,106 @@ fn emitted_code_names_every_shader() {
     let out = TempDir::new().expect("a temporary folder");
     Builder::new().folder("t", folder.path()).emit(out.path()).expect("emits");
     let code = fs::read_to_string(out.path().join("shaders.rs")).expect("written");
-    for expected in ["\"t/a.comp\"", "\"t/a.comp#x\"", "pub static SHADERS", "pub fn shader(name: &str)"] {
+    for expected in ["pub static SHADERS", "pub fn shader(name: &str)", "/shaders.bin"] {
         assert!(code.contains(expected), "expected {expected} in:\n{code}");
     }
-    assert!(Path::exists(&out.path().join("shader_1.spv")));
+    let packed = fs::read(out.path().join("shaders.bin")).expect("written");
+    let names: Vec<_> =
+        unpack_owned(&packed).expect("shaders").into_iter().map(|shader| shader.name.to_string()).collect();
+    assert_eq!(names, ["t/a.comp", "t/a.comp#x"]);
+}
+
+#[test]
+fn shaders_are_the_same_after_packing() {
+    let files = [
+        ("variants.txt", "shade.comp\na.vert"),
+        ("shade.comp", COMPUTE),
+        ("sub/lamp.glsl", LAMP),
+        (
+            "a.vert",
+            "#version 460\nlayout(location = 0) in vec3 p; layout(location = 1) flat out uint id;\nvoid main() { gl_Position = vec4(p, 1); id = 1; }",
+        ),
+    ];
+    let shaders: Vec<_> = compile(&files, &[]).expect("compiles").into_iter().map(|one| one.shader).collect();
+    let packed = pack(&shaders.iter().collect::<Vec<_>>());
+    assert_eq!(unpack_owned(&packed).as_ref(), Ok(&shaders));
+    assert_eq!(unpack(packed.clone().leak()).as_ref(), Ok(&shaders));
+    for length in 0..packed.len() {
+        unpack_owned(&packed[..length]).expect_err("is cut");
+    }
+    assert!(unpack_owned(&[packed.as_slice(), &[0]].concat()).is_err(), "one byte too many");
+    let mut wrong_stage = packed;
+    wrong_stage[8 + "t/shade.comp".len()] = 77;
+    let error = unpack_owned(&wrong_stage).expect_err("no stage").to_string();
+    assert!(error.contains("found 77 before byte 24, expected a stage"), "{error}");
+}
+
+#[test]
+fn only_what_changed_is_compiled_again() {
+    let main = |header: &str| {
+        format!("#version 460\n#include \"{header}\"\nlayout(local_size_x = SIZE) in;\nvoid main() {{}}\n")
+    };
+    let techniques = folder(&[
+        ("mine/variants.txt", "a.comp\na.comp #more MORE\nb.comp\nc.comp\nd.comp"),
+        ("mine/a.comp", &main("one.glsl")),
+        ("mine/b.comp", &main("deep.glsl")),
+        ("mine/c.comp", &main("two.glsl")),
+        ("mine/d.comp", &main("shared.glsl")),
+        ("mine/one.glsl", "#define SIZE 1\n"),
+        ("mine/two.glsl", "#define SIZE 2\n"),
+        ("mine/deep.glsl", "#include \"one.glsl\"\n"),
+        ("shared.glsl", "#define SIZE 3\n"),
+    ]);
+    let out = TempDir::new().expect("a temporary folder");
+    let emit_with = |layouts: &[StructLayout]| {
+        let builder =
+            Builder::new().include_dir(techniques.path()).folder("mine", techniques.path().join("mine"));
+        builder.layouts(layouts).emit(out.path()).unwrap_or_else(|error| panic!("{error}")).compiled_count
+    };
+    let emit = || emit_with(&[]);
+    let write = |name: &str, text: &str| fs::write(techniques.path().join(name), text).expect("written");
+    let size = |name: &str| {
+        let packed = fs::read(out.path().join("shaders.bin")).expect("written");
+        let shaders = unpack_owned(&packed).expect("shaders");
+        shaders.iter().find(|shader| shader.name == *name).expect("there").reflection.local_size[0]
+    };
+    assert_eq!(emit(), 5);
+    let written = fs::metadata(out.path().join("shaders.bin")).expect("there").modified().expect("a time");
+    assert_eq!(emit(), 0, "nothing changed");
+    let now = fs::metadata(out.path().join("shaders.bin")).expect("there").modified().expect("a time");
+    assert_eq!(now, written, "what is the same is not written again");
+
+    write("mine/one.glsl", "#define SIZE 4\n");
+    assert_eq!(emit(), 3, "two variants include it, and one through another header");
+    assert_eq!((size("mine/b.comp"), size("mine/c.comp")), (4, 2));
+    write("mine/two.glsl", "#define SIZE 5\n");
+    assert_eq!(emit(), 1);
+    write("mine/shared.glsl", "#define SIZE 6\n");
+    assert_eq!(emit(), 1, "a new file comes before the one of the include folder");
+    assert_eq!(size("mine/d.comp"), 6);
+    write("mine/variants.txt", "a.comp\na.comp #more MORE=2\nb.comp\nc.comp");
+    assert_eq!(emit(), 1, "another macro, and one variant less");
+    assert_eq!(fs::read_dir(out.path().join("shader_cache")).expect("there").count(), 4);
+    assert_eq!(emit_with(&[Lamp::LAYOUT]), 4, "other layouts");
+    assert_eq!(emit_with(&[Lamp::LAYOUT]), 0);
+    for (index, entry) in fs::read_dir(out.path().join("shader_cache")).expect("there").enumerate() {
+        let path = entry.expect("a file").path();
+        let mut bytes = fs::read(&path).expect("read");
+        match index {
+            0 => bytes.clear(),
+            1 => bytes.truncate(bytes.len() - 4),
+            2 => *bytes.last_mut().expect("not empty") ^= 1,
+            _ => continue,
+        }
+        fs::write(&path, bytes).expect("written");
+    }
+    assert_eq!(emit_with(&[Lamp::LAYOUT]), 3, "broken files of the cache");
+    write("mine/two.glsl", "#error wrong\n");
+    let builder =
+        || Builder::new().include_dir(techniques.path()).folder("mine", techniques.path().join("mine"));
+    builder().emit(out.path()).expect_err("does not compile");
+    write("mine/two.glsl", "#define SIZE 7\n");
+    assert_eq!(builder().emit(out.path()).expect("compiles").compiled_count, 1, "what did compile was kept");
 }
 
 #[test]

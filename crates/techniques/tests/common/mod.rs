@@ -215,8 +215,9 @@ fn compile(name: &str, path: &Path, folder: &Path, defines: &[&str], first: &Pat
         stage: manifest::stage_of(file).expect("a stage"),
         path: path.to_owned(),
         folder: folder.to_owned(),
+        source: None,
         defines: defines.iter().map(|d| ((*d).to_owned(), None)).collect(),
     };
-    let compiler = Compiler::new().include_dir(first).include_dir(sources());
+    let compiler = Compiler::new().override_dir(first).include_dir(sources());
     compiler.compile(&variant).unwrap_or_else(|e| panic!("{e}")).shader
 }
