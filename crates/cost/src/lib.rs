@@ -115,4 +115,3 @@ impl Workload {
         self.light_vertices * self.light_vertex_traffic
     }
 }
-

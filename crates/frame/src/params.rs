@@ -6,9 +6,6 @@ use serde::Serialize;
 
 use crate::TechniqueError;
 
-
-
-
 /// What values a parameter takes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case", tag = "kind")]

@@ -4,8 +4,11 @@ use afterlight_graph::{Graph, ImageHandle, gpu};
 use afterlight_shader::Shader;
 use serde::Serialize;
 
+use crate::{
+    Frame, TechniqueError,
+    params::{ParamInfo, Params},
+};
 use afterlight_cost::{Cost, Workload};
-use crate::{Frame, TechniqueError, params::{ParamInfo, Params}};
 
 /// Where a technique comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -113,8 +116,10 @@ pub trait Technique: Send + Sync {
     /// Facts about it.
     fn info(&self) -> &Info;
 
-    /// Compiled variants of its own shaders, by which [`Frame::shader`] finds them.
-    fn shaders(&self) -> &[Shader];
+    /// Compiled variants of its own shaders, which [`Frame::shader`] finds by their names; none where it uses those of stages alone.
+    fn shaders(&self) -> &[Shader] {
+        &[]
+    }
 
     /// Predicts its costs for a workload by the formulas of Petrescu et al. 2016, section 4. Pure arithmetic.
     fn predict(&self, workload: &Workload, params: &Params) -> Cost;

@@ -4,7 +4,10 @@
 
 use half::f16;
 
-use crate::{Technique, params::{CLUSTER_PX, Params, TILE_PX}};
+use crate::{
+    Technique,
+    params::{CLUSTER_PX, Params, TILE_PX},
+};
 
 /// The image itself.
 pub const FINAL: &str = "final";

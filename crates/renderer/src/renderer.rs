@@ -428,4 +428,3 @@ impl Prepared {
         &mut self.executor
     }
 }
-

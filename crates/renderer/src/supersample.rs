@@ -5,9 +5,9 @@ use std::sync::Arc;
 use afterlight_graph::gpu;
 use half::f16;
 
+use crate::Renderer;
 use afterlight_frame::{Post, Settings, Technique, TechniqueError, params::Params, scene::SceneGpu, views};
 use afterlight_stages::compose::present;
-use crate::Renderer;
 
 /// Renders a technique at `factor` times the settings' width and height, one sample a pixel, averages the linear radiance
 /// of `factor`×`factor` pixels, and tone-maps the mean: RGBA with 8 bits a channel, sRGB-encoded, rows from the top.

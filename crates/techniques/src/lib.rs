@@ -28,6 +28,22 @@ pub use afterlight_scene as scene;
 pub use afterlight_shader as shader;
 pub use afterlight_stages as stages;
 
+// Names of before the rooms, until the programs use the new ones.
+/// Debug views.
+pub mod view {
+    pub use afterlight_frame::views::*;
+    pub use afterlight_stages::views::{ATTRIBUTE_ERRORS, RECORD_SAMPLES};
+}
+pub use afterlight_stages::{
+    compose::post,
+    shared::{indirect, light_view, shadow},
+    surfaces::gbuffer,
+};
+/// Limits of tessellation.
+pub mod geometry {
+    pub use afterlight_frame::{MAX_DISPLACEMENT_M, MAX_TESSELLATE_PX, MIN_TESSELLATE_PX};
+}
+
 include!(concat!(env!("OUT_DIR"), "/registry.rs"));
 include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
 

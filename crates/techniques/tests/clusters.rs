@@ -9,11 +9,14 @@ use afterlight_oracle::{
     clusters::{Cell, ClusterView, slice_begins_m},
     tiles::{Decision, light_reaches},
 };
+use afterlight_stages::{
+    lights::cells::{self, Division, Grid, VisibleDepths},
+    surfaces::gbuffer,
+};
 use afterlight_techniques::{
-    Frame, Info, Params, Prepared, Renderer, Settings, Technique, TechniqueError,
-    clusters::{self, Division, Grid, Surfaces},
+    Frame, Info, Params, Prepared, Renderer, SHADERS, Settings, Technique, TechniqueError,
     cost::{Cost, Workload},
-    device_order, find, gbuffer,
+    device_order, find,
     graph::{Graph, ImageHandle, gpu::vk},
     scene::{Camera, Light, LightKind, Projection, Scene},
     shader::Shader,
@@ -25,6 +28,10 @@ use glam::{DVec4, Vec3};
 struct Lists(Division);
 
 impl Technique for Lists {
+    fn shaders(&self) -> &[Shader] {
+        &SHADERS
+    }
+
     fn info(&self) -> &Info {
         find("clustered").unwrap().info()
     }
@@ -34,8 +41,8 @@ impl Technique for Lists {
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let filled = gbuffer::fill(graph, frame, "clustered", vk::Format::D32_SFLOAT)?;
         graph.keep(&filled.depth);
-        let surfaces = Surfaces::of_depth(&filled.depth, 1);
-        let lists = clusters::build(graph, frame, "clustered", self.0, &surfaces)?;
+        let surfaces = VisibleDepths::of_depth(&filled.depth, 1);
+        let lists = cells::build(graph, frame, "clustered", self.0, &surfaces)?;
         for buffer in [&lists.cells, &lists.ends, &lists.lists] {
             graph.keep(buffer);
         }
@@ -372,7 +379,12 @@ fn the_next_cluster_is_caught() {
     let stage = Stage::new(&gpu, "builtin:colonnade?triangles=20000");
     let settings = stage.settings((160, 90), 100);
     let reference = stage.image(find("forward").unwrap(), &settings);
-    let wrong = mutant("surfaces/gbuffer/shade.comp", "lights/cells/cell_lists.glsl", "word.x & (bit - 1u)", "word.x & bit");
+    let wrong = mutant(
+        "surfaces/gbuffer/shade.comp",
+        "lights/cells/cell_lists.glsl",
+        "word.x & (bit - 1u)",
+        "word.x & bit",
+    );
     let db = psnr(&reference, &image_with(&stage, "clustered", &settings, &[wrong]));
     println!("the next cluster: {db:.2} dB");
     assert!(db < 45.0, "a mutant within the bound: {db:.2} dB");

@@ -1,26 +1,26 @@
 //! The formulas of the cost model, worked by hand.
 
+use afterlight_techniques::clustered::cost::clustered_deferred;
+use afterlight_techniques::clustered_forward::cost::clustered_forward;
 use afterlight_techniques::cost::{Cost, Workload};
-use afterlight_techniques::clustered::cost::{clustered_deferred};
-use afterlight_techniques::clustered_forward::cost::{clustered_forward};
 use afterlight_techniques::dais::cost::{dais, dais_cached};
-use afterlight_techniques::dais_list::cost::{dais_list};
-use afterlight_techniques::deferred::cost::{deferred};
-use afterlight_techniques::deferred_dedup::cost::{deferred_dedup};
-use afterlight_techniques::deferred_msaa::cost::{deferred_msaa};
-use afterlight_techniques::depth_prepass::cost::{depth_prepass};
-use afterlight_techniques::forward::cost::{forward};
-use afterlight_techniques::forward_plus::cost::{forward_plus};
-use afterlight_techniques::gbuffer_list::cost::{gbuffer_list};
-use afterlight_techniques::hybrid::cost::{hybrid};
-use afterlight_techniques::light_indexed::cost::{light_indexed};
-use afterlight_techniques::light_indexed_forward::cost::{light_indexed_forward};
-use afterlight_techniques::light_list::cost::{light_list};
-use afterlight_techniques::light_list_forward::cost::{light_list_forward};
-use afterlight_techniques::light_prepass::cost::{light_prepass};
-use afterlight_techniques::tiled::cost::{tiled_deferred};
-use afterlight_techniques::tiled_forward::cost::{tiled_forward};
-use afterlight_techniques::visibility::cost::{visibility_buffer};
+use afterlight_techniques::dais_list::cost::dais_list;
+use afterlight_techniques::deferred::cost::deferred;
+use afterlight_techniques::deferred_dedup::cost::deferred_dedup;
+use afterlight_techniques::deferred_msaa::cost::deferred_msaa;
+use afterlight_techniques::depth_prepass::cost::depth_prepass;
+use afterlight_techniques::forward::cost::forward;
+use afterlight_techniques::forward_plus::cost::forward_plus;
+use afterlight_techniques::gbuffer_list::cost::gbuffer_list;
+use afterlight_techniques::hybrid::cost::hybrid;
+use afterlight_techniques::light_indexed::cost::light_indexed;
+use afterlight_techniques::light_indexed_forward::cost::light_indexed_forward;
+use afterlight_techniques::light_list::cost::light_list;
+use afterlight_techniques::light_list_forward::cost::light_list_forward;
+use afterlight_techniques::light_prepass::cost::light_prepass;
+use afterlight_techniques::tiled::cost::tiled_deferred;
+use afterlight_techniques::tiled_forward::cost::tiled_forward;
+use afterlight_techniques::visibility::cost::visibility_buffer;
 
 fn workload() -> Workload {
     Workload {
@@ -55,19 +55,11 @@ fn formulas_give_the_papers_terms() {
     // A quarter of 10 objects twice; 50 fragments × (0.75 × 8 + 0.25 × 2); 0.25 × (200 + 40 × 7) + 0.75 × 120.
     assert_eq!(
         hybrid(&w, 0.25),
-        Cost {
-            cmd: 15.5,
-            proc: 144.0 + 25.0,
-            mem: 160.0,
-            band: (200.0 + 325.0) + 224.0 + (120.0 + 90.0)
-        }
+        Cost { cmd: 15.5, proc: 144.0 + 25.0, mem: 160.0, band: (200.0 + 325.0) + 224.0 + (120.0 + 90.0) }
     );
     assert_eq!(hybrid(&w, 0.0), deferred(&w));
     assert_eq!(hybrid(&w, 1.0), Cost { mem: 160.0, ..light_prepass(&w) });
-    assert_eq!(
-        tiled_deferred(&w),
-        Cost { cmd: 13.0, proc: 144.0, mem: 120.0, band: 600.0 + 25.0 + 167.0 }
-    );
+    assert_eq!(tiled_deferred(&w), Cost { cmd: 13.0, proc: 144.0, mem: 120.0, band: 600.0 + 25.0 + 167.0 });
     assert_eq!(
         tiled_forward(&w),
         Cost { cmd: 23.0, proc: 244.0, mem: 80.0, band: 300.0 + 25.0 + (200.0 + 200.0 + 7.0 + 80.0) }

@@ -7,13 +7,15 @@ use afterlight_oracle::{
     raster::{RayScene, pixel_ray},
     tiles::{TileView, light_reaches},
 };
+use afterlight_stages::surfaces::gbuffer;
 use afterlight_techniques::{
-    Frame, Info, Params, Technique, TechniqueError,
+    Frame, Info, Params, SHADERS, Technique, TechniqueError,
     cost::{Cost, Workload},
-    device_order, find, gbuffer,
+    device_order, find,
     graph::{Graph, ImageHandle, gpu::vk},
     registry,
     scene::{Camera, Light, Projection, builtin::edge_coverage},
+    shader::Shader,
 };
 use common::{Stage, wider};
 use glam::{DMat4, DVec3, DVec4, Vec3};
@@ -168,6 +170,10 @@ fn interpolation_agrees_with_f64() {
 struct TiledWithBits;
 
 impl Technique for TiledWithBits {
+    fn shaders(&self) -> &[Shader] {
+        &SHADERS
+    }
+
     fn info(&self) -> &Info {
         find("tiled").unwrap().info()
     }

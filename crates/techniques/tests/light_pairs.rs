@@ -6,14 +6,14 @@ use std::path::Path;
 
 use afterlight_oracle::raster::{RayScene, pixel_ray};
 use afterlight_techniques::{
-    Exactness, Frame, Info, LightPairs, Params, Settings, Technique, TechniqueError,
+    Exactness, Frame, Info, LightPairs, Params, SHADERS, Settings, Technique, TechniqueError,
     cost::{Cost, Workload},
     find,
     graph::{Graph, ImageHandle},
     registry,
     scene::{Light, LightKind},
     shader::Shader,
-    view,
+    views,
 };
 use common::{Stage, compiled_with_header, image_of, radiance_of, wider};
 use glam::{DVec3, Vec3};
@@ -38,7 +38,7 @@ fn counted(
     settings: &Settings,
     shaders: Option<Shader>,
 ) -> (Vec<[f64; 2]>, LightPairs) {
-    let settings = counting(settings, view::LIGHT_COUNT);
+    let settings = counting(settings, views::LIGHT_COUNT);
     let technique = find(technique).unwrap();
     let mut prepared = stage.prepare_shaders(technique, &settings, &Params::default(), shaders);
     let pixels = radiance_of(&mut prepared).iter().map(|p| [p[0], p[1]].map(f64::from)).collect();
@@ -145,7 +145,7 @@ fn all_counted(stage: &Stage, settings: &Settings) -> Vec<(&'static dyn Techniqu
         technique.info().samples.contains(&settings.samples) && technique.counts_light_pairs()
     };
     let run = |technique: &'static dyn Technique| {
-        let settings = counting(settings, view::LIGHT_COUNT);
+        let settings = counting(settings, views::LIGHT_COUNT);
         let mut prepared = match stage.try_prepare(technique, &settings, &Params::default()) {
             Err(TechniqueError::Unavailable { .. }) => return None,
             prepared => prepared.unwrap_or_else(|e| panic!("{}: {e}", technique.info().id)),
@@ -243,10 +243,10 @@ fn colours_are_those_of_the_legend() {
         color.iter().zip([0, 203, 89]).all(|(found, expected)| found.abs_diff(expected) <= 1)
     };
     for (range_m, view, green) in [
-        (1e3, view::LIGHT_COUNT, true),
-        (1e3, view::LIGHT_ERROR, false),
-        (1e-3, view::LIGHT_COUNT, true),
-        (1e-3, view::LIGHT_ERROR, true),
+        (1e3, views::LIGHT_COUNT, true),
+        (1e3, views::LIGHT_ERROR, false),
+        (1e-3, views::LIGHT_COUNT, true),
+        (1e-3, views::LIGHT_ERROR, true),
     ] {
         let color = middle(range_m, view);
         assert_eq!(is_green(color), green, "{view} at range {range_m}: {color:?}");
@@ -273,6 +273,10 @@ fn unlit_surfaces_and_the_background_have_no_pairs() {
 struct NoSum;
 
 impl Technique for NoSum {
+    fn shaders(&self) -> &[Shader] {
+        &SHADERS
+    }
+
     fn info(&self) -> &Info {
         find("forward").unwrap().info()
     }
@@ -291,10 +295,10 @@ impl Technique for NoSum {
 fn a_technique_that_cannot_count_does_not_list_the_views() {
     let gpu = afterlight_testkit::gpu();
     let stage = Stage::new(&gpu, "builtin:sphere?segments=8");
-    let settings = counting(&stage.settings((8, 8), 1), view::LIGHT_ERROR);
+    let settings = counting(&stage.settings((8, 8), 1), views::LIGHT_ERROR);
     let error = stage.try_prepare(&NoSum, &settings, &Params::default()).err().expect("is refused");
-    assert!(!error.to_string().contains(view::LIGHT_COUNT), "{error}");
-    assert!(view::of(find("forward").unwrap()).contains(&view::LIGHT_COUNT));
+    assert!(!error.to_string().contains(views::LIGHT_COUNT), "{error}");
+    assert!(views::of(find("forward").unwrap()).contains(&views::LIGHT_COUNT));
     // Without a view of pairs there are none.
     let mut prepared = stage.prepare(find("forward").unwrap(), &stage.settings((8, 8), 1));
     prepared.run().unwrap_or_else(|e| panic!("{e}"));

@@ -133,7 +133,7 @@ fn forward_families_agree_at_several_samples() {
 fn the_view_of_cells_shows_each_in_a_colour() {
     let gpu = afterlight_testkit::gpu();
     let stage = Stage::new(&gpu, "builtin:colonnade?triangles=17000&texture=64");
-    let shown = Settings { view: afterlight_techniques::view::CLUSTERS.to_owned(), ..settings(&stage, 1) };
+    let shown = Settings { view: afterlight_techniques::views::CLUSTERS.to_owned(), ..settings(&stage, 1) };
     let colors = |id: &str| {
         let image = image_of(&mut stage.prepare(find(id).unwrap(), &shown));
         let mut tiles = std::collections::BTreeMap::new();

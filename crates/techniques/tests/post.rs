@@ -80,7 +80,8 @@ fn exchanged_weights_are_caught() {
         let settings = Settings { post: Post::Smaa, ..stage.settings((160, 90), 0) };
         let reference = supersampled(&stage, &settings);
         let mut renderer = Renderer::with_scene(&stage.device, stage.uploaded.clone(), &settings).unwrap();
-        let swapped = SHADERS.iter().find(|s| s.name == "compose/post/smaa_blend.comp#swapped").expect("a variant");
+        let swapped =
+            SHADERS.iter().find(|s| s.name == "compose/post/smaa_blend.comp#swapped").expect("a variant");
         renderer.add_shaders([Shader { name: "compose/post/smaa_blend.comp".into(), ..swapped.clone() }]);
         let mut prepared = renderer.prepare(find("forward").unwrap(), &Params::default()).unwrap();
         let mutant = mean_flip(&reference, &image_of(&mut prepared));

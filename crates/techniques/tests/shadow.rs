@@ -7,9 +7,9 @@ use afterlight_oracle::{
     raster::{RayScene, pixel_ray},
     shadow,
 };
+use afterlight_stages::shared::light_view::SourceView;
 use afterlight_techniques::{
     Exactness, Indirect, Params, Prepared, Renderer, Settings, Shadows, Technique, Transparency, find,
-    light_view::SourceView,
     registry,
     scene::{Light, LightKind},
     shader::Shader,

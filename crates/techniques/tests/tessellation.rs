@@ -4,9 +4,9 @@
 mod common;
 
 use afterlight_image::Rgba8Image;
+use afterlight_stages::surfaces::geometry::MAX_DISPLACEMENT_M;
 use afterlight_techniques::{
     Exactness, Indirect, Params, Settings, Technique, TechniqueError, find,
-    geometry::MAX_DISPLACEMENT_M,
     graph::gpu,
     registry,
     scene::{Camera, Scene},
@@ -459,7 +459,8 @@ fn wrongly_stored_triangles_are_caught() {
     if !can(&gpu) {
         return;
     }
-    let whole = |from, to| mutant("surfaces/geometry/number.geom.glsl", "#whole", &["WHOLE_TRIANGLE"], from, to);
+    let whole =
+        |from, to| mutant("surfaces/geometry/number.geom.glsl", "#whole", &["WHOLE_TRIANGLE"], from, to);
     let read = |from, to| {
         let defines = ["LISTED", "WHOLE_TRIANGLE"];
         mutant("surfaces/triangles/derivatives.comp.glsl", "#vertices", &defines, from, to)

@@ -3,8 +3,9 @@
 mod common;
 
 use afterlight_oracle::raster::{RayScene, pixel_ray};
+use afterlight_stages::compose::transparent::SORTED_TRIANGLES_MAX;
 use afterlight_techniques::{
-    Exactness, Frame, Info, Params, Renderer, Settings, Technique, TechniqueError, Transparency,
+    Exactness, Frame, Info, Params, Renderer, SHADERS, Settings, Technique, TechniqueError, Transparency,
     cost::{Cost, Workload},
     find,
     graph::{Graph, ImageHandle, ImageInfo, Load, gpu::vk},
@@ -13,7 +14,6 @@ use afterlight_techniques::{
         Aabb, AlphaMode, Camera, Instance, Material, Mesh, Projection, Scene, VertexAttributes, load_source,
     },
     shader::Shader,
-    transparent::SORTED_TRIANGLES_MAX,
 };
 use common::{Stage, compiled, image_of, lights_of_each_kind, psnr, radiance_of, sources};
 use glam::{Affine3A, DVec3, Quat, Vec3};
@@ -182,6 +182,10 @@ struct Flat {
 }
 
 impl Technique for Flat {
+    fn shaders(&self) -> &[Shader] {
+        &SHADERS
+    }
+
     fn info(&self) -> &Info {
         find("forward").unwrap().info()
     }

@@ -5,13 +5,17 @@ mod common;
 use std::{path::Path, sync::Arc};
 
 use afterlight_oracle::packing::unpack_normal;
+use afterlight_stages::surfaces::triangles;
 use afterlight_techniques::{
-    Frame, Info, Params, Renderer, SceneGpu, Settings, Technique, TechniqueError,
+    Frame, Info, Params, Renderer, SHADERS, SceneGpu, Settings, Technique, TechniqueError,
     cost::{Cost, Workload},
     find,
-    graph::{Graph, ImageHandle, gpu, gpu::vk},
+    graph::{
+        Graph, ImageHandle,
+        gpu::{self, vk},
+    },
     scene::{Aabb, Camera, Instance, Material, Mesh, Scene, VertexAttributes, rng::SplitMix64},
-    triangle_buffer,
+    shader::Shader,
 };
 use common::{compiled, sources};
 use glam::{Affine3A, DMat4, DVec2, DVec3, DVec4, Vec3};
@@ -226,6 +230,10 @@ struct Records {
 }
 
 impl Technique for Records {
+    fn shaders(&self) -> &[Shader] {
+        &SHADERS
+    }
+
     fn info(&self) -> &Info {
         find("dais").expect("known").info()
     }
@@ -233,8 +241,8 @@ impl Technique for Records {
         Cost::default()
     }
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
-        let bits = triangle_buffer::bits(graph, frame, "test", u32::MAX);
-        let triangles = triangle_buffer::store_marked(graph, frame, "test", bits, false)?;
+        let bits = triangles::bits(graph, frame, "test", u32::MAX);
+        let triangles = triangles::store_marked(graph, frame, "test", bits, false)?;
         let pixels = frame.table(graph, "test/pixels", &self.pixels)?;
         let found = graph.buffer("test/found", 48 * self.pixels.len() as u64);
         let mut pass = frame.compute(graph, "test/attributes", &frame.shader("test/attributes.comp")?);

@@ -7,7 +7,7 @@ use afterlight_techniques::{
     graph::gpu,
     scene::{Camera, Projection},
     shader::Shader,
-    view,
+    views,
 };
 use common::{Stage, compiled, params, sources};
 
@@ -82,10 +82,10 @@ fn samples_of_a_record_are_counted() {
         let settings = Settings { samples, keep_hdr: true, ..stage.from(camera.clone(), (101, 57), 0) };
         let white = stage.radiance(find("forward").unwrap(), &settings);
         let covered: f64 = white.iter().map(|p| f64::from(p[0] * samples as f32)).sum();
-        let settings = Settings { view: view::TRIANGLE_SHARING.to_owned(), ..settings };
+        let settings = Settings { view: views::TRIANGLE_SHARING.to_owned(), ..settings };
         for way in ways(samples) {
             let mut prepared = prepared(&stage, &settings, &way, None);
-            let counts = words(&mut prepared, way.0, view::RECORD_SAMPLES);
+            let counts = words(&mut prepared, way.0, views::RECORD_SAMPLES);
             let image = prepared.hdr_rgba().unwrap().expect("kept");
             let sum: f64 = counts.iter().map(|c| f64::from(*c)).sum();
             println!("{}: {sum} of {covered} samples in {:?}", way.2, &counts[..4]);
@@ -131,14 +131,14 @@ fn tessellated_surfaces_share_and_are_not_compared() {
                 continue;
             }
             let way = (technique, Params::default(), format!("{id}, {samples} samples"));
-            let sharing = Settings { view: view::TRIANGLE_SHARING.to_owned(), ..settings.clone() };
-            let counts = words(&mut prepared(&stage, &sharing, &way, None), technique, view::RECORD_SAMPLES);
+            let sharing = Settings { view: views::TRIANGLE_SHARING.to_owned(), ..settings.clone() };
+            let counts = words(&mut prepared(&stage, &sharing, &way, None), technique, views::RECORD_SAMPLES);
             let sum: f64 = counts.iter().map(|c| f64::from(*c)).sum();
             let used = counts.iter().filter(|count| **count > 0).count();
             println!("{}: {sum} of {covered} samples, {used} records", way.2);
             assert_eq!(sum, covered, "{}", way.2);
             assert!(used > 20, "{}: {used} records of triangles of 16 pixels", way.2);
-            let error = Settings { view: view::ATTRIBUTE_ERROR.to_owned(), ..settings.clone() };
+            let error = Settings { view: views::ATTRIBUTE_ERROR.to_owned(), ..settings.clone() };
             let refused = stage.try_prepare(technique, &error, &way.1).err().expect("no ID to compare by");
             let told = refused.to_string();
             assert!(told.contains("attribute-error") && told.contains("tessellate"), "{told}");
@@ -175,10 +175,10 @@ fn attributes_are_those_of_the_rasteriser() {
     let stage = Stage::new(&gpu, "builtin:colonnade?triangles=30000&texture=64");
     for samples in counts(&gpu) {
         let settings =
-            Settings { samples, view: view::ATTRIBUTE_ERROR.to_owned(), ..stage.settings((160, 90), 2) };
+            Settings { samples, view: views::ATTRIBUTE_ERROR.to_owned(), ..stage.settings((160, 90), 2) };
         let mut first = None;
         for way in ways(samples) {
-            let errors = words(&mut prepared(&stage, &settings, &way, None), way.0, view::ATTRIBUTE_ERRORS);
+            let errors = words(&mut prepared(&stage, &settings, &way, None), way.0, views::ATTRIBUTE_ERRORS);
             let Compared { pixels, position_max, position_mean, texture_mean } = compared(&errors);
             println!(
                 "{}: {pixels} pixels, positions {position_max:.2e} and {position_mean:.2e}, textures {texture_mean:.2e}",
@@ -201,7 +201,7 @@ fn attributes_are_those_of_the_rasteriser() {
 fn wrong_records_are_seen() {
     let gpu = afterlight_testkit::gpu();
     let stage = Stage::new(&gpu, "builtin:colonnade?triangles=30000&texture=64");
-    let settings = Settings { view: view::ATTRIBUTE_ERROR.to_owned(), ..stage.settings((160, 90), 2) };
+    let settings = Settings { view: views::ATTRIBUTE_ERROR.to_owned(), ..stage.settings((160, 90), 2) };
     let way = ways(1).next().expect("dais");
     for replaced in [
         ("by * (inverse_det * pixel_ndc.y)", "by * (inverse_det * -pixel_ndc.y)"),
@@ -211,7 +211,7 @@ fn wrong_records_are_seen() {
         let name = "surfaces/triangles/derivatives.comp#ids";
         let mutant = compiled(name, &path, &["RECORD_IDS"], &[replaced]);
         let mut prepared = prepared(&stage, &settings, &way, Some(mutant));
-        let found = compared(&words(&mut prepared, way.0, view::ATTRIBUTE_ERRORS));
+        let found = compared(&words(&mut prepared, way.0, views::ATTRIBUTE_ERRORS));
         println!("{}: {:.2e}, {:.2e}", replaced.1, found.position_mean, found.texture_mean);
         assert!(found.position_mean > POSITION_MEAN && found.texture_mean > TEXTURE_MEAN, "{}", replaced.1);
     }

@@ -1,13 +1,18 @@
 //! A technique from outside the workspace: its own shader over Afterlight's G-buffer stage, run beside the built-in ones.
 
 use afterlight_image::{Rgba8Image, write_png};
+use afterlight_techniques::stages::surfaces::gbuffer;
 use afterlight_techniques::{
     Answers, AppendixA, Exactness, Frame, Info, ParamInfo, ParamKind, Params, Renderer, Settings, Technique,
     TechniqueError,
-    cost::{Cost, Workload, tiled_deferred},
-    gbuffer,
-    graph::{Graph, ImageHandle, gpu, gpu::vk},
+    cost::{Cost, Workload},
+    graph::{
+        Graph, ImageHandle,
+        gpu::{self, vk},
+    },
     scene,
+    shader::Shader,
+    tiled::cost::tiled_deferred,
 };
 
 include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
@@ -47,6 +52,10 @@ static INFO: Info = Info {
 impl Technique for Toon {
     fn info(&self) -> &Info {
         &INFO
+    }
+
+    fn shaders(&self) -> &[Shader] {
+        &SHADERS
     }
 
     fn predict(&self, workload: &Workload, _: &Params) -> Cost {

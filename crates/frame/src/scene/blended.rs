@@ -6,7 +6,10 @@ use afterlight_scene::{Aabb, Scene};
 use afterlight_shader::structs::DrawData;
 use glam::{Mat4, Vec3, Vec4};
 
-use crate::scene::{DrawInfo, draw_list::{DrawCommand, Frustum, displaced}};
+use crate::scene::{
+    DrawInfo,
+    draw_list::{DrawCommand, Frustum, displaced},
+};
 
 /// What the CPU keeps of a scene's draws with alpha blending.
 pub struct Blended {

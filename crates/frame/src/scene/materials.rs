@@ -23,7 +23,10 @@ pub(super) fn slots(m: &Material) -> [(Option<TextureRef>, Role); 5] {
 const IDENTITY_TRANSFORM: [[f32; 3]; 2] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
 
 /// Material records and the rows of all texture transforms, five transforms for each material that has one.
-pub(super) fn material_records(materials: &[Material], table: &TextureTable) -> (Vec<MaterialData>, Vec<[f32; 4]>) {
+pub(super) fn material_records(
+    materials: &[Material],
+    table: &TextureTable,
+) -> (Vec<MaterialData>, Vec<[f32; 4]>) {
     let mut transforms = Vec::new();
     let records = materials
         .iter()

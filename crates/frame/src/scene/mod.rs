@@ -149,4 +149,3 @@ impl SceneGpu {
         self.blended.triangle_count() as u64
     }
 }
-

@@ -13,7 +13,13 @@ use afterlight_scene::{
 };
 use rayon::prelude::*;
 
-use crate::{TechniqueError, scene::{Progress, materials::{image_name, slots}}};
+use crate::{
+    TechniqueError,
+    scene::{
+        Progress,
+        materials::{image_name, slots},
+    },
+};
 
 /// Use of a texture.
 pub type Role = TextureRole;

@@ -3,8 +3,8 @@
 //! Where they are counted, `light_radiance` and what stands beside it in `include/shading.glsl` give counts in the place of radiance, and
 //! nothing else gives any: the image that a technique ends in, whatever way it sums lights, holds two counts a pixel.
 
-use afterlight_graph::{Graph, ImageHandle, gpu::vk};
 use afterlight_frame::{Frame, TechniqueError, views::LIGHT_ERROR};
+use afterlight_graph::{Graph, ImageHandle, gpu::vk};
 
 /// Declares the pass that turns the counts into colours.
 ///
@@ -24,4 +24,3 @@ pub fn light_pair_colors(
     pass.finish();
     Ok(target)
 }
-

@@ -2,9 +2,9 @@
 
 use afterlight_graph::{ComputePass, Graph, ImageHandle, Load, gpu::vk};
 
+use crate::surfaces::{geometry::SceneDraws, triangles::Records};
 use afterlight_frame::views::TEXTURE_ERROR;
 use afterlight_frame::{Frame, SourceSlots, TechniqueError};
-use crate::surfaces::{geometry::SceneDraws, triangles::Records};
 use afterlight_scene::Aabb;
 
 /// Name, after the technique's, of the buffer of errors that [`RecordSource::record`] keeps: two 32-bit floats a

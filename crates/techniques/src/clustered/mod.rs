@@ -6,10 +6,18 @@ pub mod cost;
 
 use afterlight_graph::{Graph, ImageHandle, gpu::vk};
 
-use afterlight_shader::Shader;
-use afterlight_frame::{Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError};
-use afterlight_stages::{lights::{cells::{Division, Grid, VisibleDepths, self}, step::LightStep}, surfaces::gbuffer};
 use afterlight_cost::{Cost, Workload};
+use afterlight_frame::{
+    Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError,
+};
+use afterlight_shader::Shader;
+use afterlight_stages::{
+    lights::{
+        cells::{self, Division, Grid, VisibleDepths},
+        step::LightStep,
+    },
+    surfaces::gbuffer,
+};
 
 /// The technique.
 pub static TECHNIQUE: Clustered = Clustered;

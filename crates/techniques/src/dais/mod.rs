@@ -10,11 +10,23 @@ pub mod cost;
 
 use afterlight_graph::{BufferHandle, Graph, ImageHandle, Load, RasterPass, gpu::vk};
 
-use afterlight_shader::Shader;
-use afterlight_frame::{OpaqueDepth, ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, ParamInfo, ParamKind, Params, Source, SourceSlots, Technique, TechniqueError, views};
-use afterlight_stages::{views::RecordSource, lights::{cells, step}, surfaces::{compute_raster, shade, visible::NO_TRIANGLE_RGBA8, triangles::{Records, self}, visible::Visible}};
-use afterlight_cost::{Cost, Workload};
 use crate::dais_multirate::LowRate;
+use afterlight_cost::{Cost, Workload};
+use afterlight_frame::{
+    ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, OpaqueDepth, ParamInfo, ParamKind, Params,
+    Source, SourceSlots, Technique, TechniqueError, views,
+};
+use afterlight_shader::Shader;
+use afterlight_stages::{
+    lights::{cells, step},
+    surfaces::{
+        compute_raster, shade,
+        triangles::{self, Records},
+        visible::NO_TRIANGLE_RGBA8,
+        visible::Visible,
+    },
+    views::RecordSource,
+};
 
 /// The technique.
 pub static TECHNIQUE: Dais = Dais;
@@ -191,8 +203,7 @@ pub(crate) fn shade(
 ) -> Result<ImageHandle, TechniqueError> {
     if views::is_of_triangles(frame.view) {
         let samples = frame.samples;
-        return RecordSource { technique: info.id, tag: source, samples, records, bind }
-            .record(graph, frame);
+        return RecordSource { technique: info.id, tag: source, samples, records, bind }.record(graph, frame);
     }
     let source = format!("{source}{}", rate.map_or("", LowRate::tag));
     shade::shade(graph, frame, info, (&source, frame.samples), surfaces, &|pass| {

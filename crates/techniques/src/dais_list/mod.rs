@@ -6,11 +6,22 @@ pub mod cost;
 
 use afterlight_graph::{BufferHandle, Graph, ImageHandle, ImageInfo, Load, RasterPass};
 
-use afterlight_shader::Shader;
-use afterlight_frame::{Answers, Exactness, Frame, Info, MULTIPLE_SAMPLES, Need, ParamInfo, ParamKind, Params, Source, SourceSlots, Technique, TechniqueError, capacity::FIRST_GUESS, scene::DRAW_TRIANGLES, views};
-use afterlight_stages::{surfaces::claims, lights::{cells, step}, surfaces::{claims::NOT_TAKEN, depth_first::FIRST_FRAGMENT, triangles}};
+use crate::{
+    dais::{self, Cache, FillPass},
+    dais_multirate::{FULL_RATE, LowRate, SHARE},
+    gbuffer_list,
+};
 use afterlight_cost::{Cost, Workload};
-use crate::{dais::{Cache, FillPass, self}, dais_multirate::{FULL_RATE, LowRate, SHARE}, gbuffer_list::self};
+use afterlight_frame::{
+    Answers, Exactness, Frame, Info, MULTIPLE_SAMPLES, Need, ParamInfo, ParamKind, Params, Source,
+    SourceSlots, Technique, TechniqueError, capacity::FIRST_GUESS, scene::DRAW_TRIANGLES, views,
+};
+use afterlight_shader::Shader;
+use afterlight_stages::{
+    lights::{cells, step},
+    surfaces::claims,
+    surfaces::{claims::NOT_TAKEN, depth_first::FIRST_FRAGMENT, triangles},
+};
 
 /// The technique.
 pub static TECHNIQUE: DaisList = DaisList;
@@ -174,10 +185,7 @@ impl Triangles {
         let most = references_max(frame.samples);
         if frame.tessellate_px.is_some() {
             let cache = Cache::new(graph, frame, &INFO);
-            return Ok(Self::Listed {
-                cache,
-                list: triangles::List::new(graph, frame, INFO.id, most)?,
-            });
+            return Ok(Self::Listed { cache, list: triangles::List::new(graph, frame, INFO.id, most)? });
         }
         let triangles = u64::from(DRAW_TRIANGLES) * frame.scene.draw_count() as u64;
         if triangles > u64::from(most) {

@@ -4,12 +4,15 @@
 
 use afterlight_graph::{Graph, ImageHandle};
 
-use afterlight_shader::Shader;
-use afterlight_frame::{Answers, Exactness, Frame, Info, ParamInfo, ParamKind, Params, Source, SourceSlots, Technique, TechniqueError, views};
-use afterlight_stages::{shared::indirect::IndirectLight, lights::step, surfaces::compute_raster};
-use afterlight_cost::{Cost, Workload};
 use crate::dais;
+use afterlight_cost::{Cost, Workload};
+use afterlight_frame::{
+    Answers, Exactness, Frame, Info, ParamInfo, ParamKind, Params, Source, SourceSlots, Technique,
+    TechniqueError, views,
+};
 use afterlight_graph::gpu;
+use afterlight_shader::Shader;
+use afterlight_stages::{lights::step, shared::indirect::IndirectLight, surfaces::compute_raster};
 
 /// The technique.
 pub static TECHNIQUE: DaisMultirate = DaisMultirate;

@@ -6,10 +6,19 @@ pub mod cost;
 
 use afterlight_graph::{Graph, ImageHandle, Load, gpu::vk};
 
-use afterlight_shader::Shader;
-use afterlight_frame::{OpaqueDepth, Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError};
-use afterlight_stages::{lights::{cells::VisibleDepths, step::{LightStep, self}, volumes}, surfaces::gbuffer};
 use afterlight_cost::{Cost, Workload};
+use afterlight_frame::{
+    Answers, AppendixA, Exactness, Frame, Info, OpaqueDepth, Params, Source, Technique, TechniqueError,
+};
+use afterlight_shader::Shader;
+use afterlight_stages::{
+    lights::{
+        cells::VisibleDepths,
+        step::{self, LightStep},
+        volumes,
+    },
+    surfaces::gbuffer,
+};
 
 /// The technique.
 pub static TECHNIQUE: Deferred = Deferred;

@@ -6,9 +6,12 @@ pub mod cost;
 
 use afterlight_graph::{Graph, ImageHandle};
 
-use afterlight_shader::Shader;
-use afterlight_frame::{OpaqueDepth, Answers, AppendixA, Exactness, Frame, Info, MULTIPLE_SAMPLES, Params, Source, Technique, TechniqueError};
 use afterlight_cost::{Cost, Workload};
+use afterlight_frame::{
+    Answers, AppendixA, Exactness, Frame, Info, MULTIPLE_SAMPLES, OpaqueDepth, Params, Source, Technique,
+    TechniqueError,
+};
+use afterlight_shader::Shader;
 use afterlight_stages::{lights::step, surfaces::shade};
 
 /// The technique.

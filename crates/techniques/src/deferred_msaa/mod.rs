@@ -7,10 +7,16 @@ pub mod cost;
 
 use afterlight_graph::{DepthTest, Graph, ImageHandle, Load, StencilFace, StencilTest, gpu::vk};
 
-use afterlight_shader::Shader;
-use afterlight_frame::{OpaqueDepth, Answers, AppendixA, Exactness, Frame, Info, MULTIPLE_SAMPLES, Params, Source, Technique, TechniqueError};
 use afterlight_cost::{Cost, Workload};
-use afterlight_stages::{lights::step, surfaces::shade::{SampleBuffer, emission_variant, self}};
+use afterlight_frame::{
+    Answers, AppendixA, Exactness, Frame, Info, MULTIPLE_SAMPLES, OpaqueDepth, Params, Source, Technique,
+    TechniqueError,
+};
+use afterlight_shader::Shader;
+use afterlight_stages::{
+    lights::step,
+    surfaces::shade::{self, SampleBuffer, emission_variant},
+};
 
 /// The technique.
 pub static TECHNIQUE: DeferredMsaa = DeferredMsaa;
@@ -99,8 +105,7 @@ fn shade_by_stencil(
     let mark = shade::full_screen(frame, "surfaces/shade/mark.frag", &samples)?.stencil(MARK);
     let shaded = |rate: &str| {
         let fragment = emission_variant(frame, &format!("surfaces/shade/shade.frag#{rate}"));
-        let state =
-            shade::full_screen(frame, &fragment, &shade::shade_constants(frame, frame.samples))?;
+        let state = shade::full_screen(frame, &fragment, &shade::shade_constants(frame, frame.samples))?;
         Ok::<_, TechniqueError>(state.stencil(MARKED).depth(DepthTest::OFF))
     };
     let (at_pixels, at_samples) = (shaded("pixel")?, shaded("sample")?);

@@ -4,9 +4,11 @@
 
 use afterlight_graph::{Blend, DepthTest, Graph, ImageHandle, Load, StencilFace, StencilTest, gpu::vk};
 
-use afterlight_shader::Shader;
-use afterlight_frame::{OpaqueDepth, Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError};
 use afterlight_cost::{Cost, Workload};
+use afterlight_frame::{
+    Answers, AppendixA, Exactness, Frame, Info, OpaqueDepth, Params, Source, Technique, TechniqueError,
+};
+use afterlight_shader::Shader;
 use afterlight_stages::{lights::volumes, surfaces::gbuffer};
 
 /// The technique.

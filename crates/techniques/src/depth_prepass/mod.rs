@@ -6,10 +6,17 @@ pub mod cost;
 
 use afterlight_graph::{DepthTest, Graph, ImageHandle, Load, RasterPass, StencilFace, StencilTest, gpu::vk};
 
-use afterlight_shader::Shader;
-use afterlight_frame::{OpaqueDepth, ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError, views::INVOCATIONS};
 use afterlight_cost::{Cost, Workload};
-use afterlight_stages::{surfaces::depth_first::{FIRST_FRAGMENT, draw_depth}, surfaces::{depth_first::shaded_surfaces, geometry::SceneDraws, RadianceTarget}, views::InvocationCount};
+use afterlight_frame::{
+    ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, OpaqueDepth, Params, Source, Technique,
+    TechniqueError, views::INVOCATIONS,
+};
+use afterlight_shader::Shader;
+use afterlight_stages::{
+    surfaces::depth_first::{FIRST_FRAGMENT, draw_depth},
+    surfaces::{RadianceTarget, depth_first::shaded_surfaces, geometry::SceneDraws},
+    views::InvocationCount,
+};
 
 /// The technique.
 pub static TECHNIQUE: DepthPrepass = DepthPrepass;

@@ -6,10 +6,17 @@ pub mod cost;
 
 use afterlight_graph::{Graph, ImageHandle, Load, gpu::vk};
 
-use afterlight_shader::Shader;
-use afterlight_frame::{VisitsAllLights, OpaqueDepth, ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError, views::INVOCATIONS};
 use afterlight_cost::{Cost, Workload};
-use afterlight_stages::{surfaces::depth_first::shaded_surfaces, surfaces::{geometry::SceneDraws, RadianceTarget}, views::InvocationCount};
+use afterlight_frame::{
+    ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, OpaqueDepth, Params, Source, Technique,
+    TechniqueError, VisitsAllLights, views::INVOCATIONS,
+};
+use afterlight_shader::Shader;
+use afterlight_stages::{
+    surfaces::depth_first::shaded_surfaces,
+    surfaces::{RadianceTarget, geometry::SceneDraws},
+    views::InvocationCount,
+};
 
 /// The technique.
 pub static TECHNIQUE: Forward = Forward;
@@ -76,4 +83,3 @@ impl Technique for Forward {
         count.map_or(Ok(radiance), |count| count.heat(graph, frame, "forward"))
     }
 }
-

@@ -6,9 +6,12 @@ use afterlight_graph::{Blend, DepthTest, Graph, ImageHandle, Load, RasterPass, R
 use afterlight_scene::Aabb;
 use glam::{Mat4, Vec3};
 
-use afterlight_shader::Shader;
-use afterlight_frame::{camera_view::screen_rect, OpaqueDepth, Answers, AppendixA, Exactness, Frame, Info, ParamInfo, ParamKind, Params, Source, Technique, TechniqueError};
 use afterlight_cost::{Cost, Workload};
+use afterlight_frame::{
+    Answers, AppendixA, Exactness, Frame, Info, OpaqueDepth, ParamInfo, ParamKind, Params, Source, Technique,
+    TechniqueError, camera_view::screen_rect,
+};
+use afterlight_shader::Shader;
 use afterlight_stages::surfaces::{depth_first::FIRST_FRAGMENT, geometry::SceneDraws};
 
 /// The technique.
@@ -128,4 +131,3 @@ fn draw_lights(frame: &Frame<'_>, pass: &mut RasterPass<'_>) -> Result<(), Techn
     }
     Ok(())
 }
-

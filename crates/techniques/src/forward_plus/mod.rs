@@ -6,10 +6,16 @@ pub mod cost;
 
 use afterlight_graph::{Graph, ImageHandle};
 
-use afterlight_shader::Shader;
-use afterlight_frame::{params::TILE_PX, ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError};
-use afterlight_stages::{lights::cells::{Division, self}, surfaces::depth_first::record_forward};
 use afterlight_cost::{Cost, Workload};
+use afterlight_frame::{
+    ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError,
+    params::TILE_PX,
+};
+use afterlight_shader::Shader;
+use afterlight_stages::{
+    lights::cells::{self, Division},
+    surfaces::depth_first::record_forward,
+};
 
 /// The technique.
 pub static TECHNIQUE: ForwardPlus = ForwardPlus;

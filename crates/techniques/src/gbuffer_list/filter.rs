@@ -3,7 +3,11 @@
 
 use afterlight_graph::ConstantBits as _;
 
-use afterlight_frame::{Info, Params, params::{ParamInfo, ParamKind}, scene::SceneGpu};
+use afterlight_frame::{
+    Info, Params,
+    params::{ParamInfo, ParamKind},
+    scene::SceneGpu,
+};
 
 /// Which filters there are; each word's place is its bit in `filter.glsl`.
 const WORDS: &[&str] = &["ellipse", "rectangle", "depth", "objects", "depth-edges", "edges"];

@@ -10,10 +10,17 @@ use afterlight_graph::{
     BufferHandle, DepthTest, Graph, ImageHandle, Load, StencilFace, StencilTest, gpu::vk,
 };
 
-use afterlight_shader::Shader;
-use afterlight_frame::{OpaqueDepth, ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, ParamInfo, ParamKind, Params, Source, Technique, TechniqueError};
-use afterlight_stages::{surfaces::claims::{NOT_TAKEN, claims}, lights::{cells, step}, surfaces::{compute_raster, depth_first::FIRST_FRAGMENT, geometry::SceneDraws, shade::self, visible::Visible}};
 use afterlight_cost::{Cost, Workload};
+use afterlight_frame::{
+    ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, OpaqueDepth, ParamInfo, ParamKind, Params,
+    Source, Technique, TechniqueError,
+};
+use afterlight_shader::Shader;
+use afterlight_stages::{
+    lights::{cells, step},
+    surfaces::claims::{NOT_TAKEN, claims},
+    surfaces::{compute_raster, depth_first::FIRST_FRAGMENT, geometry::SceneDraws, shade, visible::Visible},
+};
 
 /// The technique.
 pub static TECHNIQUE: GbufferList = GbufferList;
@@ -227,18 +234,17 @@ impl Technique for GbufferList {
             Samples::Keys(keys) => cells::VisibleDepths::of_keys(keys, layout.samples),
             Samples::Depth(depth) => cells::VisibleDepths::of_depth(depth, layout.samples),
         };
-        let radiance =
-            shade::shade(graph, frame, &INFO, (source, layout.samples), &surfaces, &|pass| {
-                for (name, value) in layout.constants() {
-                    pass.constant(name, value);
-                }
-                pass.constant("KEEPS_ALL", u32::from(layout.keeps_all));
-                pass.read_buffer("Blocks", &lists.blocks);
-                match &lists.samples {
-                    Samples::Depth(depth) => pass.read_image("gbuffer_depth", depth),
-                    Samples::Keys(keys) => pass.read_buffer("SampleKeys", keys),
-                }
-            })?;
+        let radiance = shade::shade(graph, frame, &INFO, (source, layout.samples), &surfaces, &|pass| {
+            for (name, value) in layout.constants() {
+                pass.constant(name, value);
+            }
+            pass.constant("KEEPS_ALL", u32::from(layout.keeps_all));
+            pass.read_buffer("Blocks", &lists.blocks);
+            match &lists.samples {
+                Samples::Depth(depth) => pass.read_image("gbuffer_depth", depth),
+                Samples::Keys(keys) => pass.read_buffer("SampleKeys", keys),
+            }
+        })?;
         drop(surfaces);
         if let Samples::Depth(depth) = lists.samples {
             frame.board.put(OpaqueDepth(depth));

@@ -8,11 +8,19 @@ use afterlight_graph::{
     Blend, BufferHandle, DepthTest, Graph, ImageHandle, Load, RasterPass, StencilFace, StencilTest, gpu::vk,
 };
 
-use afterlight_shader::Shader;
-use afterlight_frame::{Answers, AppendixA, Exactness, Frame, Info, Need, ParamInfo, ParamKind, Params, Source, Technique, TechniqueError};
+use crate::light_prepass::{self, SUMS};
 use afterlight_cost::{Cost, Workload};
-use afterlight_stages::surfaces::{depth_first::FIRST_FRAGMENT, gbuffer::{GBuffer, self}, geometry::SceneDraws, shade};
-use crate::light_prepass::{SUMS, self};
+use afterlight_frame::{
+    Answers, AppendixA, Exactness, Frame, Info, Need, ParamInfo, ParamKind, Params, Source, Technique,
+    TechniqueError,
+};
+use afterlight_shader::Shader;
+use afterlight_stages::surfaces::{
+    depth_first::FIRST_FRAGMENT,
+    gbuffer::{self, GBuffer},
+    geometry::SceneDraws,
+    shade,
+};
 use paths::{Path, Run};
 
 mod paths;
@@ -160,7 +168,8 @@ impl Technique for Hybrid {
 /// First pass: draws fill the G-buffer as a whole, or but normal and roughness, in the order of all techniques.
 fn fill(graph: &mut Graph, frame: &Frame<'_>, draws: &Draws) -> Result<GBuffer, TechniqueError> {
     let mut whole =
-        SceneDraws::shaded(frame, "surfaces/gbuffer/gbuffer.frag", "surfaces/gbuffer/gbuffer.frag#mask")?.stencil(OWNER, COLORED);
+        SceneDraws::shaded(frame, "surfaces/gbuffer/gbuffer.frag", "surfaces/gbuffer/gbuffer.frag#mask")?
+            .stencil(OWNER, COLORED);
     whole.blend = vec![Blend::REPLACE; 4];
     let mut lobe =
         SceneDraws::shaded(frame, "light_prepass/lobe.frag#gbuffer", "light_prepass/lobe.frag#gbuffer-mask")?
@@ -203,8 +212,7 @@ fn apply_materials(
 
 /// Adds what pixels with colours reflect of the light that they gathered.
 fn compose(frame: &Frame<'_>, pass: &mut RasterPass<'_>) -> Result<(), TechniqueError> {
-    let state =
-        shade::full_screen(frame, "hybrid/compose.frag", &[])?.stencil(OWNED).blend(vec![Blend::ADD]);
+    let state = shade::full_screen(frame, "hybrid/compose.frag", &[])?.stencil(OWNED).blend(vec![Blend::ADD]);
     shade::draw_full_screen(pass, state, COLORED);
     Ok(())
 }

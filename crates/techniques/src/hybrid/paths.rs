@@ -6,7 +6,11 @@ use std::ops::Range;
 use afterlight_graph::Rect;
 use glam::{Mat4, Vec3};
 
-use afterlight_frame::{Frame, camera_view::screen_rect, scene::{BUCKETS, Bucket, DrawInfo}};
+use afterlight_frame::{
+    Frame,
+    camera_view::screen_rect,
+    scene::{BUCKETS, Bucket, DrawInfo},
+};
 use afterlight_scene::Aabb;
 
 /// How a draw gets its colours.

@@ -6,9 +6,9 @@ pub mod cost;
 
 use afterlight_graph::{Graph, ImageHandle, gpu::vk};
 
-use afterlight_shader::Shader;
-use afterlight_frame::{Answers, AppendixA, Frame, Info, Params, Source, Technique, TechniqueError};
 use afterlight_cost::{Cost, Workload};
+use afterlight_frame::{Answers, AppendixA, Frame, Info, Params, Source, Technique, TechniqueError};
+use afterlight_shader::Shader;
 use afterlight_stages::{lights::indices, surfaces::gbuffer};
 
 /// The technique.

@@ -6,10 +6,13 @@ pub mod cost;
 
 use afterlight_graph::{Graph, ImageHandle};
 
-use afterlight_shader::Shader;
-use afterlight_frame::{Answers, AppendixA, Frame, Info, Params, Source, Technique, TechniqueError};
 use afterlight_cost::{Cost, Workload};
-use afterlight_stages::{lights::indices, surfaces::depth_first::{draw_depth, shade_visible}};
+use afterlight_frame::{Answers, AppendixA, Frame, Info, Params, Source, Technique, TechniqueError};
+use afterlight_shader::Shader;
+use afterlight_stages::{
+    lights::indices,
+    surfaces::depth_first::{draw_depth, shade_visible},
+};
 
 /// The technique.
 pub static TECHNIQUE: LightIndexedForward = LightIndexedForward;

@@ -6,10 +6,15 @@ pub mod cost;
 
 use afterlight_graph::{Graph, ImageHandle, gpu::vk};
 
-use afterlight_shader::Shader;
-use afterlight_frame::{Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError};
 use afterlight_cost::{Cost, Workload};
-use afterlight_stages::{lights::{pixel_lists, step::LightStep}, surfaces::gbuffer};
+use afterlight_frame::{
+    Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError,
+};
+use afterlight_shader::Shader;
+use afterlight_stages::{
+    lights::{pixel_lists, step::LightStep},
+    surfaces::gbuffer,
+};
 
 /// The technique.
 pub static TECHNIQUE: SceneLights = SceneLights;

@@ -6,10 +6,15 @@ pub mod cost;
 
 use afterlight_graph::{Graph, ImageHandle};
 
-use afterlight_shader::Shader;
-use afterlight_frame::{ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError};
 use afterlight_cost::{Cost, Workload};
-use afterlight_stages::{lights::{pixel_lists, step::LightStep}, surfaces::depth_first::{draw_depth, shade_forward}};
+use afterlight_frame::{
+    ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError,
+};
+use afterlight_shader::Shader;
+use afterlight_stages::{
+    lights::{pixel_lists, step::LightStep},
+    surfaces::depth_first::{draw_depth, shade_forward},
+};
 
 /// The technique.
 pub static TECHNIQUE: LightListForward = LightListForward;

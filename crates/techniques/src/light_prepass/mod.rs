@@ -6,10 +6,15 @@ pub mod cost;
 
 use afterlight_graph::{DepthTest, Graph, ImageHandle, Load, gpu::vk};
 
-use afterlight_shader::Shader;
-use afterlight_frame::{OpaqueDepth, Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError};
 use afterlight_cost::{Cost, Workload};
-use afterlight_stages::{lights::volumes, surfaces::{depth_first::FIRST_FRAGMENT, geometry::SceneDraws}};
+use afterlight_frame::{
+    Answers, AppendixA, Exactness, Frame, Info, OpaqueDepth, Params, Source, Technique, TechniqueError,
+};
+use afterlight_shader::Shader;
+use afterlight_stages::{
+    lights::volumes,
+    surfaces::{depth_first::FIRST_FRAGMENT, geometry::SceneDraws},
+};
 
 /// The technique.
 pub static TECHNIQUE: LightPrepass = LightPrepass;

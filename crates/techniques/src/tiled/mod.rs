@@ -6,9 +6,11 @@ pub mod cost;
 
 use afterlight_graph::{Graph, ImageHandle, gpu::vk};
 
-use afterlight_shader::Shader;
-use afterlight_frame::{OpaqueDepth, Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError};
 use afterlight_cost::{Cost, Workload};
+use afterlight_frame::{
+    Answers, AppendixA, Exactness, Frame, Info, OpaqueDepth, Params, Source, Technique, TechniqueError,
+};
+use afterlight_shader::Shader;
 use afterlight_stages::surfaces::gbuffer;
 
 /// The technique.

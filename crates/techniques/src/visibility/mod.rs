@@ -6,10 +6,19 @@ pub mod cost;
 
 use afterlight_graph::{Graph, ImageHandle, Load, gpu::vk};
 
-use afterlight_shader::Shader;
-use afterlight_frame::{OpaqueDepth, Answers, AppendixA, Exactness, Frame, Info, Params, Source, SourceSlots, Technique, TechniqueError};
-use afterlight_stages::{lights::{cells::VisibleDepths, step::{LightStep, self}}, surfaces::{compute_raster, geometry, shade::add_volumes}};
 use afterlight_cost::{Cost, Workload};
+use afterlight_frame::{
+    Answers, AppendixA, Exactness, Frame, Info, OpaqueDepth, Params, Source, SourceSlots, Technique,
+    TechniqueError,
+};
+use afterlight_shader::Shader;
+use afterlight_stages::{
+    lights::{
+        cells::VisibleDepths,
+        step::{self, LightStep},
+    },
+    surfaces::{compute_raster, geometry, shade::add_volumes},
+};
 
 /// The technique.
 pub static TECHNIQUE: Visibility = Visibility;

@@ -10,8 +10,8 @@ use afterlight_graph::{
     gpu::{self, SamplerDesc, vk},
 };
 
-use afterlight_frame::{Post, Frame, TechniqueError, views};
 use crate::{compose::present, surfaces::geometry::SceneDraws};
+use afterlight_frame::{Frame, Post, TechniqueError, views};
 
 /// Layout in which uploads leave images.
 const UPLOADED: vk::ImageLayout = vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL;
@@ -85,7 +85,8 @@ fn smaa(
     pass.dispatch(frame.groups(8));
     pass.finish();
 
-    let mut pass = frame.compute(graph, "post/smaa-weights", &frame.shader("compose/post/smaa_weights.comp")?);
+    let mut pass =
+        frame.compute(graph, "post/smaa-weights", &frame.shader("compose/post/smaa_weights.comp")?);
     pass.read_sampled("edges", &edges, SamplerDesc::LINEAR);
     pass.read_sampled("area", &area, SamplerDesc::LINEAR).read("search", &search);
     let weights = pass.write("weights", weights);

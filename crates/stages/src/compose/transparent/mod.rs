@@ -6,8 +6,16 @@ use afterlight_graph::{
     gpu::{self, vk},
 };
 
-use afterlight_frame::{scene::blended::ViewOrder, OpaqueDepth, VisitsAllLights, Transparency, CameraView, Frame, SceneGpu, Settings, TechniqueError, scene::{Bucket, draw_list::COMMAND_BYTES}, views};
-use crate::{lights::step::LightStep, surfaces::{geometry::SceneDraws, shade}};
+use crate::{
+    lights::step::LightStep,
+    surfaces::{geometry::SceneDraws, shade},
+};
+use afterlight_frame::{
+    CameraView, Frame, OpaqueDepth, SceneGpu, Settings, TechniqueError, Transparency, VisitsAllLights,
+    scene::blended::ViewOrder,
+    scene::{Bucket, draw_list::COMMAND_BYTES},
+    views,
+};
 
 /// Triangles that are sorted at most; where the scene has more, draws are.
 pub const SORTED_TRIANGLES_MAX: usize = 100_000;
@@ -137,8 +145,8 @@ pub fn draw(
     drawn.draw(frame, &mut pass, OVER_LAYERS)?;
     pass.finish();
 
-    let composite =
-        shade::full_screen(frame, "compose/transparent/composite.frag", &[])?.blend(vec![LAYERS_OVER_RADIANCE]);
+    let composite = shade::full_screen(frame, "compose/transparent/composite.frag", &[])?
+        .blend(vec![LAYERS_OVER_RADIANCE]);
     let mut pass = graph.raster("shared/transparent composite");
     pass.read("layers", &layers);
     let hdr = pass.color(hdr, Load::Keep);

@@ -8,8 +8,12 @@ use afterlight_graph::{BufferHandle, ComputePass, Graph, ImageHandle};
 
 use afterlight_shader::Shader;
 
-use afterlight_frame::{Frame, Params, params::{CLUSTER_PX, SLICES, SLICING}, Slots, TechniqueError, capacity::FIRST_GUESS};
-use crate::lights::bvh::{LightBvh, self};
+use crate::lights::bvh::{self, LightBvh};
+use afterlight_frame::{
+    Frame, Params, Slots, TechniqueError,
+    capacity::FIRST_GUESS,
+    params::{CLUSTER_PX, SLICES, SLICING},
+};
 
 /// How the view is divided.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -254,7 +258,11 @@ impl<'a> Stage<'a> {
     }
 
     /// Cells that hold a surface.
-    fn find_cells(&self, graph: &mut Graph, surfaces: &VisibleDepths<'_>) -> Result<FoundCells, TechniqueError> {
+    fn find_cells(
+        &self,
+        graph: &mut Graph,
+        surfaces: &VisibleDepths<'_>,
+    ) -> Result<FoundCells, TechniqueError> {
         let cells = graph.buffer(&self.name("cells"), 16 * u64::from(self.cell_capacity.max(1)));
         let words = graph.buffer(&self.name("cell words"), 8 * self.words.max(1));
         let count = self.zeroed(graph, "cell count");

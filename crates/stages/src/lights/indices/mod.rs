@@ -4,10 +4,12 @@
 use afterlight_graph::{Blend, BlendEquation, Graph, ImageHandle, Load, gpu::vk};
 use glam::Mat4;
 
-use afterlight_frame::{Exactness, Frame, Info, ParamInfo, ParamKind, Params, SceneLights, Slots, TechniqueError};
-use afterlight_cost::Workload;
-use afterlight_scene::Light;
 use crate::lights::volumes;
+use afterlight_cost::Workload;
+use afterlight_frame::{
+    Exactness, Frame, Info, ParamInfo, ParamKind, Params, SceneLights, Slots, TechniqueError,
+};
+use afterlight_scene::Light;
 
 /// Parts of a light's index.
 pub const INDEX_PARTS: ParamInfo = ParamInfo {
@@ -52,17 +54,21 @@ fn room(images: u32) -> u32 {
     PART_VALUES.pow(IMAGE_PARTS * images) - 1
 }
 
+/// How many parts an index has where the technique's parameter says so.
+fn fixed_parts(params: &Params, info: &Info) -> Option<u32> {
+    params.text(info, INDEX_PARTS.key).parse().ok()
+}
+
 /// Images of four parts for `lights` lights with an end, or for how many there is room at most.
-fn images(params: &Params, info: &Info, lights: u32) -> Result<u32, u32> {
-    let fixed: Option<u32> = params.text(info, INDEX_PARTS.key).parse().ok();
-    let fixed = fixed.map(|parts| parts / IMAGE_PARTS);
+fn images(fixed_parts: Option<u32>, lights: u32) -> Result<u32, u32> {
+    let fixed = fixed_parts.map(|parts| parts / IMAGE_PARTS);
     let most = fixed.unwrap_or(MOST_IMAGES);
     (fixed.unwrap_or(1)..=most).find(|images| lights <= room(*images)).ok_or(room(most))
 }
 
 /// Floats a pixel of the packed indices, for predictions.
 pub fn floats(workload: &Workload, params: &Params, info: &Info) -> f64 {
-    let images = images(params, info, workload.lights as u32).unwrap_or(MOST_IMAGES);
+    let images = images(fixed_parts(params, info), workload.lights as u32).unwrap_or(MOST_IMAGES);
     f64::from(2 * images)
 }
 
@@ -83,16 +89,17 @@ pub fn build(
     depth: &ImageHandle,
 ) -> Result<LightIndices, TechniqueError> {
     let bounded = frame.lights.count - frame.lights.unbounded_count;
-    let count = images(frame.params, info, bounded).map_err(|limit| TechniqueError::TooLarge {
-        what: format!(
-            "{}: lights with an end for {}={}",
-            info.id,
-            INDEX_PARTS.key,
-            frame.params.get(&INDEX_PARTS)
-        ),
-        found: bounded.into(),
-        limit: limit.into(),
-    })?;
+    let count =
+        images(fixed_parts(frame.params, info), bounded).map_err(|limit| TechniqueError::TooLarge {
+            what: format!(
+                "{}: lights with an end for {}={}",
+                info.id,
+                INDEX_PARTS.key,
+                frame.params.get(&INDEX_PARTS)
+            ),
+            found: bounded.into(),
+            limit: limit.into(),
+        })?;
     let image = |i| {
         let name = format!("{}/light indices {i}", info.id);
         graph.image(&name, frame.image_info(vk::Format::R16G16B16A16_SFLOAT))
@@ -203,15 +210,10 @@ mod tests {
     #[test]
     fn images_have_room() {
         assert_eq!([1, 2, 3].map(room), [80, 6560, 531_440]);
-        let info = afterlight_techniques::find("light-indexed").expect("there").info();
-        let with = |parts: &str, lights| {
-            let mut params = Params::default();
-            params.set(info, INDEX_PARTS.key, parts).expect("a value");
-            images(&params, info, lights)
-        };
-        let auto = [0, 80, 81, 6560, 6561, 531_440, 531_441].map(|lights| with("auto", lights));
+        let auto = [0, 80, 81, 6560, 6561, 531_440, 531_441].map(|lights| images(None, lights));
         assert_eq!(auto, [Ok(1), Ok(1), Ok(2), Ok(2), Ok(3), Ok(3), Err(531_440)]);
-        assert_eq!((with("8", 3), with("8", 6560), with("4", 81)), (Ok(2), Ok(2), Err(80)));
+        let fixed = |parts, lights| images(Some(parts), lights);
+        assert_eq!((fixed(8, 3), fixed(8, 6560), fixed(4, 81)), (Ok(2), Ok(2), Err(80)));
     }
 
     #[test]

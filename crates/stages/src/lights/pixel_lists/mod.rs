@@ -2,9 +2,13 @@
 
 use afterlight_graph::{BufferHandle, DepthTest, Graph, ImageHandle, gpu::vk};
 
-use afterlight_frame::{Frame, ParamInfo, ParamKind, Slots, TechniqueError, capacity::FIRST_GUESS};
-use crate::lights::{bvh::{LightBvh, self}, cells::VisibleDepths, volumes};
+use crate::lights::{
+    bvh::{self, LightBvh},
+    cells::VisibleDepths,
+    volumes,
+};
 use afterlight_cost::Workload;
+use afterlight_frame::{Frame, ParamInfo, ParamKind, Slots, TechniqueError, capacity::FIRST_GUESS};
 
 /// Nodes of the lists.
 pub const NODES: ParamInfo = ParamInfo {

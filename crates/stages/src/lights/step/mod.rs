@@ -3,8 +3,15 @@
 
 use afterlight_graph::{Graph, ImageHandle};
 
+use crate::{
+    lights::{
+        bvh::{self, LightBvh},
+        cells::{self, CellLists, Division, Grid, VisibleDepths},
+        pixel_lists::{self, LightLists},
+    },
+    surfaces::depth_first::{draw_depth, shade_visible},
+};
 use afterlight_frame::{Frame, Info, ParamInfo, ParamKind, Params, Slots, TechniqueError, views};
-use crate::{lights::{bvh::{LightBvh, self}, cells::{CellLists, Division, Grid, VisibleDepths, self}, pixel_lists::{LightLists, self}}, surfaces::depth_first::{draw_depth, shade_visible}};
 
 /// Lights up to which a loop over all of them costs less than any structure, by `auto`.
 const FEW_LIGHTS: u32 = 16;
@@ -156,4 +163,3 @@ impl LightStep {
         all.map(|(name, value)| (name.to_owned(), value)).collect()
     }
 }
-

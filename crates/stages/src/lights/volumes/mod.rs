@@ -110,7 +110,8 @@ pub fn ordered_state(
     cull: vk::CullModeFlags,
     blend: Vec<Blend>,
 ) -> Result<RasterState, TechniqueError> {
-    state(frame, "lights/volumes/volume.vert#ordered", Some(fragment), cull, blend).map(|s| s.layout(layout()))
+    state(frame, "lights/volumes/volume.vert#ordered", Some(fragment), cull, blend)
+        .map(|s| s.layout(layout()))
 }
 
 fn state(

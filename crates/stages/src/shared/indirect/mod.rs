@@ -8,8 +8,8 @@ use std::f32::consts::{PI, TAU};
 use afterlight_graph::{BufferHandle, Graph, ImageHandle, ImageInfo, Load, gpu::vk};
 use afterlight_shader::structs::RsmConstants;
 
-use afterlight_frame::{Indirect, SceneInput, Slots, Frame, SceneGpu, Settings, TechniqueError};
 use crate::{shared::light_view, surfaces::geometry::SceneDraws};
+use afterlight_frame::{Frame, Indirect, SceneGpu, SceneInput, Settings, Slots, TechniqueError};
 
 /// Texels that a surface gathers from.
 pub const SAMPLES: usize = 64;
@@ -76,11 +76,7 @@ pub fn pattern() -> [[f32; 3]; SAMPLES] {
 ///
 /// # Errors
 /// A shader that is not compiled in, the device.
-pub fn record(
-    graph: &mut Graph,
-    frame: &mut Frame<'_>,
-    settings: &Settings,
-) -> Result<(), TechniqueError> {
+pub fn record(graph: &mut Graph, frame: &mut Frame<'_>, settings: &Settings) -> Result<(), TechniqueError> {
     let source = match settings.indirect {
         Indirect::None => None,
         Indirect::Rsm => light_view::source(frame.scene, settings),
@@ -121,7 +117,8 @@ fn raster(
     let surface = image(graph, "surface", vk::Format::R32G32B32A32_UINT);
     let flux = image(graph, "flux", vk::Format::R16G16B16A16_SFLOAT);
     let depth = image(graph, "depth", vk::Format::D32_SFLOAT);
-    let mut surfaces = SceneDraws::shaded(frame, "shared/indirect/rsm.frag", "shared/indirect/rsm.frag#mask")?;
+    let mut surfaces =
+        SceneDraws::shaded(frame, "shared/indirect/rsm.frag", "shared/indirect/rsm.frag#mask")?;
     surfaces.push = light_index.to_le_bytes().to_vec();
     let mut pass = graph.raster("shared/rsm");
     frame.bind_scene(&mut pass);

@@ -10,7 +10,10 @@ use afterlight_graph::{
 use afterlight_scene::{Aabb, Camera, Light, LightKind, Projection};
 use glam::{Mat4, Vec3};
 
-use afterlight_frame::{CameraView, Frame, SceneGpu, Settings, TechniqueError, scene::draw_list::{DrawList, DrawOptions}};
+use afterlight_frame::{
+    CameraView, Frame, SceneGpu, Settings, TechniqueError,
+    scene::draw_list::{DrawList, DrawOptions},
+};
 
 /// Widest angle of a light's perspective view, radians: further out a texel has hardly any solid angle.
 const WIDEST_RAD: f32 = 150.0 / 180.0 * PI;

@@ -8,8 +8,11 @@ use afterlight_scene::Projection;
 use afterlight_shader::structs::ShadowConstants;
 use glam::{Mat4, Vec3};
 
-use afterlight_frame::{Shadows, SceneInput, Slots, Frame, SceneGpu, Settings, TechniqueError};
-use crate::{shared::light_view::{SourceView, self}, surfaces::geometry::SceneDraws};
+use crate::{
+    shared::light_view::{self, SourceView},
+    surfaces::geometry::SceneDraws,
+};
+use afterlight_frame::{Frame, SceneGpu, SceneInput, Settings, Shadows, Slots, TechniqueError};
 
 /// How far from a point the filter reads along each axis, at most, texels: it covers a texel to each side of the point, and the
 /// centre of a texel is half a texel from where it begins.
@@ -48,11 +51,7 @@ pub fn warning(settings: &Settings, scene: &SceneGpu) -> Option<String> {
 ///
 /// # Errors
 /// A shader that is not compiled in, the device.
-pub fn record(
-    graph: &mut Graph,
-    frame: &mut Frame<'_>,
-    settings: &Settings,
-) -> Result<(), TechniqueError> {
+pub fn record(graph: &mut Graph, frame: &mut Frame<'_>, settings: &Settings) -> Result<(), TechniqueError> {
     let source = match settings.shadows {
         Shadows::None => None,
         Shadows::Map => light_view::source(frame.scene, settings),

@@ -11,12 +11,7 @@ pub const NOT_TAKEN: StencilTest = {
 
 /// Declares the claims by which masked surfaces of one depth share the samples of a pixel (`claims.glsl`); none where the scene
 /// has no masked surfaces.
-pub fn claims(
-    graph: &mut Graph,
-    frame: &Frame<'_>,
-    technique: &str,
-    samples: u32,
-) -> Option<BufferHandle> {
+pub fn claims(graph: &mut Graph, frame: &Frame<'_>, technique: &str, samples: u32) -> Option<BufferHandle> {
     frame.scene.has_masked().then(|| {
         let bits = if samples > 8 { 16 } else { 8 };
         let pixels = u64::from(frame.width_px) * u64::from(frame.height_px);

@@ -6,7 +6,11 @@
 
 use afterlight_graph::{BufferHandle, Graph};
 
-use afterlight_frame::{Frame, Info, TechniqueError, params::{ParamInfo, ParamKind}, scene::{BUCKETS, DRAW_TRIANGLES}};
+use afterlight_frame::{
+    Frame, Info, TechniqueError,
+    params::{ParamInfo, ParamKind},
+    scene::{BUCKETS, DRAW_TRIANGLES},
+};
 
 /// Large triangles that the first frame has room for.
 const FIRST_LARGE: u32 = 1 << 16;

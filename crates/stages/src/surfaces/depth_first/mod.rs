@@ -1,11 +1,14 @@
 //! Depth alone first, then forward shading of what is visible: by a loop over all lights, or by the lists of lights of a light step.
 
-use afterlight_frame::{OpaqueDepth, Frame, Info, TechniqueError, views::INVOCATIONS};
+use afterlight_frame::{Frame, Info, OpaqueDepth, TechniqueError, views::INVOCATIONS};
 use afterlight_graph::{DepthTest, Graph, ImageHandle, Load, RasterPass, StencilFace, StencilTest, gpu::vk};
 
 use crate::{
-    lights::{cells::{self, Division, VisibleDepths}, step::LightStep},
-    surfaces::{geometry::SceneDraws, RadianceTarget},
+    lights::{
+        cells::{self, Division, VisibleDepths},
+        step::LightStep,
+    },
+    surfaces::{RadianceTarget, geometry::SceneDraws},
 };
 
 /// Lets the first fragment of a pixel pass and no other: where two surfaces have one depth, the first drawn wins, as in a
@@ -67,8 +70,16 @@ pub fn shade_visible(
 /// SceneDraws shaded by a loop over all lights; they count their fragments where that is to be shown.
 pub fn shaded_surfaces(frame: &Frame<'_>) -> Result<SceneDraws, TechniqueError> {
     match frame.shows(INVOCATIONS) {
-        true => SceneDraws::shaded(frame, "surfaces/depth_first/forward.frag#count", "surfaces/depth_first/forward.frag#mask-count"),
-        false => SceneDraws::shaded(frame, "surfaces/depth_first/forward.frag", "surfaces/depth_first/forward.frag#mask"),
+        true => SceneDraws::shaded(
+            frame,
+            "surfaces/depth_first/forward.frag#count",
+            "surfaces/depth_first/forward.frag#mask-count",
+        ),
+        false => SceneDraws::shaded(
+            frame,
+            "surfaces/depth_first/forward.frag",
+            "surfaces/depth_first/forward.frag#mask",
+        ),
     }
 }
 

@@ -12,8 +12,8 @@
 
 use afterlight_graph::{ComputePass, Graph, ImageHandle, Load, RasterPass, gpu::vk};
 
-use afterlight_frame::{OpaqueDepth, Frame, Slots, TechniqueError};
 use crate::{lights::step::LightStep, surfaces::geometry::SceneDraws};
+use afterlight_frame::{Frame, OpaqueDepth, Slots, TechniqueError};
 
 /// Handles of a filled G-buffer.
 pub struct GBuffer {
@@ -39,7 +39,8 @@ pub fn fill(
     technique: &str,
     depth_format: vk::Format,
 ) -> Result<GBuffer, TechniqueError> {
-    let surfaces = SceneDraws::shaded(frame, "surfaces/gbuffer/gbuffer.frag", "surfaces/gbuffer/gbuffer.frag#mask")?;
+    let surfaces =
+        SceneDraws::shaded(frame, "surfaces/gbuffer/gbuffer.frag", "surfaces/gbuffer/gbuffer.frag#mask")?;
     Ok(fill_by(graph, frame, technique, depth_format, |pass| surfaces.draw(frame, pass)))
 }
 

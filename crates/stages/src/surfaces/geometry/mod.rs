@@ -13,7 +13,10 @@ use afterlight_graph::{
 use afterlight_graph::{VertexAttribute, VertexLayout, VertexStream};
 use afterlight_shader::Shader;
 
-use afterlight_frame::{MIN_TESSELLATE_PX, Frame, TechniqueError, scene::{BUCKETS, Bucket, draw_list::COMMAND_BYTES}};
+use afterlight_frame::{
+    Frame, MIN_TESSELLATE_PX, TechniqueError,
+    scene::{BUCKETS, Bucket, draw_list::COMMAND_BYTES},
+};
 
 /// Shaders of one kind of surface.
 pub struct SurfaceShaders {
@@ -79,7 +82,11 @@ impl SceneDraws {
     /// # Errors
     /// A name that is not compiled in.
     pub fn shaded(frame: &Frame<'_>, opaque: &str, masked: &str) -> Result<Self, TechniqueError> {
-        Self::new(frame, ("surfaces/geometry/surface.vert", Some(opaque)), ("surfaces/geometry/surface.vert", masked))
+        Self::new(
+            frame,
+            ("surfaces/geometry/surface.vert", Some(opaque)),
+            ("surfaces/geometry/surface.vert", masked),
+        )
     }
 
     /// Depth alone: no fragment shader for opaque surfaces, the alpha test for masked ones.
@@ -235,12 +242,7 @@ impl SceneDraws {
     }
 
     /// A draw of surfaces of one bucket by any call whose first instances are draw numbers.
-    pub fn bucket_draw<'a>(
-        &self,
-        frame: &'a Frame<'_>,
-        bucket: Bucket,
-        call: DrawCall<'a>,
-    ) -> Draw<'a> {
+    pub fn bucket_draw<'a>(&self, frame: &'a Frame<'_>, bucket: Bucket, call: DrawCall<'a>) -> Draw<'a> {
         let shaders = if bucket.masked() { &self.masked } else { &self.opaque };
         let mut state = RasterState::new(&shaders.vertex, shaders.fragment.as_ref());
         let all: Vec<&Shader> = std::iter::once(&shaders.vertex).chain(&shaders.fragment).collect();

@@ -10,8 +10,11 @@
 
 use afterlight_graph::{BufferHandle, Graph, ImageHandle, Load, RasterPass, gpu::vk};
 
+use crate::{
+    lights::{cells, step::LightStep, volumes},
+    surfaces::{geometry::SceneDraws, visible::NO_TRIANGLE_RGBA8},
+};
 use afterlight_frame::{Frame, Info, Need, Slots, SourceSlots, TechniqueError, views};
-use crate::{lights::{cells, step::LightStep, volumes}, surfaces::{geometry::SceneDraws, visible::NO_TRIANGLE_RGBA8}};
 
 /// Positions are reconstructed where the samples stand.
 pub const STANDARD_LOCATIONS: Need =
@@ -60,8 +63,14 @@ pub fn fill_samples(
 ) -> Result<SampleBuffer, TechniqueError> {
     let surfaces = SceneDraws::new(
         frame,
-        ("surfaces/geometry/surface.vert#centroid", Some(&emission_variant(frame, "surfaces/shade/samples.frag"))),
-        ("surfaces/geometry/surface.vert#centroid", &emission_variant(frame, "surfaces/shade/samples.frag#mask")),
+        (
+            "surfaces/geometry/surface.vert#centroid",
+            Some(&emission_variant(frame, "surfaces/shade/samples.frag")),
+        ),
+        (
+            "surfaces/geometry/surface.vert#centroid",
+            &emission_variant(frame, "surfaces/shade/samples.frag#mask"),
+        ),
     )?;
     let images = [
         ("gbuffer_base_color", vk::Format::R8G8B8A8_SRGB, Load::DontCare),

@@ -8,8 +8,13 @@
 
 use afterlight_graph::{BufferHandle, ComputePass, Graph, RasterPass};
 
-use afterlight_frame::{Frame, Slots, TechniqueError, capacity::{FIRST_GUESS, self}, scene::DRAW_TRIANGLES, views};
 use crate::surfaces::visible::Visible;
+use afterlight_frame::{
+    Frame, Slots, TechniqueError,
+    capacity::{self, FIRST_GUESS},
+    scene::DRAW_TRIANGLES,
+    views,
+};
 
 /// Words of 32 bits for a draw's triangles.
 const WORDS_A_DRAW: u64 = DRAW_TRIANGLES as u64 / 32;
@@ -117,7 +122,8 @@ impl List {
 
         let ids = RecordIds::wanted(graph, frame, technique, self.capacity);
         let stored = if frame.tessellate_px.is_some() { "vertices" } else { "list" };
-        let shader = frame.shader(&format!("surfaces/triangles/derivatives.comp#{stored}{}", ids.tag('-')))?;
+        let shader =
+            frame.shader(&format!("surfaces/triangles/derivatives.comp#{stored}{}", ids.tag('-')))?;
         let mut pass = frame.compute(graph, &format!("{technique}/derivatives"), &shader);
         pass.constant("TRIANGLE_CAPACITY", self.capacity);
         pass.read("TriangleCount", &self.count);

@@ -3,8 +3,11 @@
 
 use afterlight_graph::{BufferHandle, Graph, ImageHandle, Load, gpu::vk};
 
+use crate::{
+    lights::cells,
+    surfaces::{compute_raster, geometry::SceneDraws},
+};
 use afterlight_frame::{Frame, Info, Slots, TechniqueError};
-use crate::{lights::cells, surfaces::{compute_raster, geometry::SceneDraws}};
 
 /// What a pixel without a surface holds in an image of triangle IDs: `NO_TRIANGLE`, all ones.
 pub const NO_TRIANGLE_RGBA8: [f32; 4] = [1.0; 4];
