@@ -11,3 +11,5 @@ pub use record::{
     Run, RunResult, SCHEMA, SceneRecord, SettingsRecord, Status,
 };
 pub use stats::Spread;
+
+pub use afterlight_roles::{BufferRole, PassRole, PassWork};

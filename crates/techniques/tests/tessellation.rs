@@ -3,8 +3,8 @@
 
 mod common;
 
+use afterlight_frame::MAX_DISPLACEMENT_M;
 use afterlight_image::Rgba8Image;
-use afterlight_stages::surfaces::geometry::MAX_DISPLACEMENT_M;
 use afterlight_techniques::{
     Exactness, Indirect, Params, Settings, Technique, TechniqueError, find,
     graph::gpu,

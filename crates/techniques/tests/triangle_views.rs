@@ -2,6 +2,7 @@
 
 mod common;
 
+use afterlight_stages::views::{ATTRIBUTE_ERRORS, RECORD_SAMPLES};
 use afterlight_techniques::{
     Params, Prepared, Settings, Technique, find,
     graph::gpu,
@@ -85,7 +86,7 @@ fn samples_of_a_record_are_counted() {
         let settings = Settings { view: views::TRIANGLE_SHARING.to_owned(), ..settings };
         for way in ways(samples) {
             let mut prepared = prepared(&stage, &settings, &way, None);
-            let counts = words(&mut prepared, way.0, views::RECORD_SAMPLES);
+            let counts = words(&mut prepared, way.0, RECORD_SAMPLES);
             let image = prepared.hdr_rgba().unwrap().expect("kept");
             let sum: f64 = counts.iter().map(|c| f64::from(*c)).sum();
             println!("{}: {sum} of {covered} samples in {:?}", way.2, &counts[..4]);
@@ -132,7 +133,7 @@ fn tessellated_surfaces_share_and_are_not_compared() {
             }
             let way = (technique, Params::default(), format!("{id}, {samples} samples"));
             let sharing = Settings { view: views::TRIANGLE_SHARING.to_owned(), ..settings.clone() };
-            let counts = words(&mut prepared(&stage, &sharing, &way, None), technique, views::RECORD_SAMPLES);
+            let counts = words(&mut prepared(&stage, &sharing, &way, None), technique, RECORD_SAMPLES);
             let sum: f64 = counts.iter().map(|c| f64::from(*c)).sum();
             let used = counts.iter().filter(|count| **count > 0).count();
             println!("{}: {sum} of {covered} samples, {used} records", way.2);
@@ -178,7 +179,7 @@ fn attributes_are_those_of_the_rasteriser() {
             Settings { samples, view: views::ATTRIBUTE_ERROR.to_owned(), ..stage.settings((160, 90), 2) };
         let mut first = None;
         for way in ways(samples) {
-            let errors = words(&mut prepared(&stage, &settings, &way, None), way.0, views::ATTRIBUTE_ERRORS);
+            let errors = words(&mut prepared(&stage, &settings, &way, None), way.0, ATTRIBUTE_ERRORS);
             let Compared { pixels, position_max, position_mean, texture_mean } = compared(&errors);
             println!(
                 "{}: {pixels} pixels, positions {position_max:.2e} and {position_mean:.2e}, textures {texture_mean:.2e}",
@@ -211,7 +212,7 @@ fn wrong_records_are_seen() {
         let name = "surfaces/triangles/derivatives.comp#ids";
         let mutant = compiled(name, &path, &["RECORD_IDS"], &[replaced]);
         let mut prepared = prepared(&stage, &settings, &way, Some(mutant));
-        let found = compared(&words(&mut prepared, way.0, views::ATTRIBUTE_ERRORS));
+        let found = compared(&words(&mut prepared, way.0, ATTRIBUTE_ERRORS));
         println!("{}: {:.2e}, {:.2e}", replaced.1, found.position_mean, found.texture_mean);
         assert!(found.position_mean > POSITION_MEAN && found.texture_mean > TEXTURE_MEAN, "{}", replaced.1);
     }

@@ -4,7 +4,7 @@
 //! nothing else gives any: the image that a technique ends in, whatever way it sums lights, holds two counts a pixel.
 
 use afterlight_frame::{Frame, TechniqueError, views::LIGHT_ERROR};
-use afterlight_graph::{Graph, ImageHandle, gpu::vk};
+use afterlight_graph::{BufferRole, Graph, ImageHandle, PassRole, gpu::vk};
 
 /// Declares the pass that turns the counts into colours.
 ///
@@ -15,8 +15,13 @@ pub fn light_pair_colors(
     frame: &Frame<'_>,
     counts: &ImageHandle,
 ) -> Result<ImageHandle, TechniqueError> {
-    let target = graph.image("view/light pairs", frame.image_info(vk::Format::R16G16B16A16_SFLOAT));
-    let mut pass = frame.compute(graph, "view/light-pairs", &frame.shader("views/light_pairs.comp")?);
+    let target = graph.image(
+        "view/light pairs",
+        BufferRole::Targets,
+        frame.image_info(vk::Format::R16G16B16A16_SFLOAT),
+    );
+    let mut pass =
+        frame.compute(graph, "view/light-pairs", PassRole::Upkeep, &frame.shader("views/light_pairs.comp")?);
     pass.constant("LIGHT_ERROR", u32::from(frame.shows(LIGHT_ERROR)));
     pass.read("light_pairs", counts);
     let target = pass.write("hdr", target);

@@ -4,7 +4,7 @@
 
 pub mod cost;
 
-use afterlight_graph::{Graph, ImageHandle, Load, gpu::vk};
+use afterlight_graph::{Graph, ImageHandle, Load, PassRole, gpu::vk};
 
 use afterlight_cost::{Cost, Workload};
 use afterlight_frame::{
@@ -82,7 +82,7 @@ impl Technique for Deferred {
                 return gbuffer::shade(graph, frame, INFO.id, filled, &step);
             }
         }
-        let mut pass = graph.raster("deferred/lights");
+        let mut pass = graph.raster("deferred/lights", PassRole::Shading);
         frame.bind_scene(&mut pass);
         gbuffer::bind(&mut pass, &filled);
         filled.accumulation = pass.color(filled.accumulation, Load::Keep);

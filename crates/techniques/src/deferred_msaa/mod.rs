@@ -5,7 +5,9 @@
 
 pub mod cost;
 
-use afterlight_graph::{DepthTest, Graph, ImageHandle, Load, StencilFace, StencilTest, gpu::vk};
+use afterlight_graph::{
+    BufferRole, DepthTest, Graph, ImageHandle, Load, PassRole, StencilFace, StencilTest, gpu::vk,
+};
 
 use afterlight_cost::{Cost, Workload};
 use afterlight_frame::{
@@ -99,8 +101,16 @@ fn shade_by_stencil(
     frame: &Frame<'_>,
     filled: &SampleBuffer,
 ) -> Result<ImageHandle, TechniqueError> {
-    let stencil = graph.image("deferred-msaa/stencil", frame.image_info(frame.depth_stencil_format()));
-    let radiance = graph.image("deferred-msaa/radiance", frame.image_info(vk::Format::R16G16B16A16_SFLOAT));
+    let stencil = graph.image(
+        "deferred-msaa/stencil",
+        BufferRole::Depth,
+        frame.image_info(frame.depth_stencil_format()),
+    );
+    let radiance = graph.image(
+        "deferred-msaa/radiance",
+        BufferRole::Targets,
+        frame.image_info(vk::Format::R16G16B16A16_SFLOAT),
+    );
     let samples = [("SAMPLES", frame.samples)];
     let mark = shade::full_screen(frame, "surfaces/shade/mark.frag", &samples)?.stencil(MARK);
     let shaded = |rate: &str| {
@@ -110,7 +120,7 @@ fn shade_by_stencil(
     };
     let (at_pixels, at_samples) = (shaded("pixel")?, shaded("sample")?);
 
-    let mut pass = graph.raster("deferred-msaa/edges");
+    let mut pass = graph.raster("deferred-msaa/edges", PassRole::Resolve);
     frame.bind_scene(&mut pass);
     filled.bind(&mut pass);
     // Its depth is not used, but attached.
@@ -119,7 +129,7 @@ fn shade_by_stencil(
     shade::draw_full_screen(&mut pass, mark, 1);
     pass.finish();
 
-    let mut pass = graph.raster("deferred-msaa/shade");
+    let mut pass = graph.raster("deferred-msaa/shade", PassRole::Shading);
     frame.bind_scene(&mut pass);
     filled.bind(&mut pass);
     // The two draws cover every pixel.

@@ -4,7 +4,9 @@
 
 pub mod cost;
 
-use afterlight_graph::{DepthTest, Graph, ImageHandle, Load, RasterPass, StencilFace, StencilTest, gpu::vk};
+use afterlight_graph::{
+    BufferRole, DepthTest, Graph, ImageHandle, Load, PassRole, RasterPass, StencilFace, StencilTest, gpu::vk,
+};
 
 use afterlight_cost::{Cost, Workload};
 use afterlight_frame::{
@@ -71,7 +73,7 @@ impl Technique for DepthPrepass {
         let mut count = frame.shows(INVOCATIONS).then(|| InvocationCount::new(graph, frame, "depth-prepass"));
 
         let depth = draw_depth(graph, frame, INFO.id)?;
-        let mut pass = graph.raster("depth-prepass/shade");
+        let mut pass = graph.raster("depth-prepass/shade", PassRole::Shading);
         frame.bind_scene(&mut pass);
         count = count.map(|count| count.bind(&mut pass));
         let radiance = target.attach(frame, &mut pass);

@@ -7,7 +7,8 @@ mod filter;
 pub mod cost;
 
 use afterlight_graph::{
-    BufferHandle, DepthTest, Graph, ImageHandle, Load, StencilFace, StencilTest, gpu::vk,
+    BufferHandle, BufferRole, DepthTest, Graph, ImageHandle, Load, PassRole, StencilFace, StencilTest,
+    gpu::vk,
 };
 
 use afterlight_cost::{Cost, Workload};
@@ -259,13 +260,17 @@ fn empty_lists(
     frame: &Frame<'_>,
     layout: &Layout,
 ) -> Result<(BufferHandle, BufferHandle, BufferHandle), TechniqueError> {
-    let blocks = graph.buffer("gbuffer-list/blocks", layout.bytes(frame)?);
-    let count = graph.buffer("gbuffer-list/block count", 8);
+    let blocks = graph.buffer("gbuffer-list/blocks", BufferRole::SurfaceListNodes, layout.bytes(frame)?);
+    let count = graph.buffer("gbuffer-list/block count", BufferRole::SurfaceListNodes, 8);
     let objects = frame.params.text(&INFO, filter::OBJECTS.key);
-    let flagged =
-        frame.table(graph, "gbuffer-list/flagged draws", &filter::flagged_draws(frame.scene, objects))?;
-    let blocks = graph.clear_buffer("gbuffer-list/clear blocks", blocks, 0);
-    let count = graph.clear_buffer("gbuffer-list/clear count", count, 0);
+    let flagged = frame.table(
+        graph,
+        "gbuffer-list/flagged draws",
+        BufferRole::Scene,
+        &filter::flagged_draws(frame.scene, objects),
+    )?;
+    let blocks = graph.clear_buffer("gbuffer-list/clear blocks", PassRole::Geometry, blocks, 0);
+    let count = graph.clear_buffer("gbuffer-list/clear count", PassRole::Geometry, count, 0);
     Ok((blocks, count, flagged))
 }
 
@@ -283,7 +288,7 @@ fn fill_by_compute(graph: &mut Graph, frame: &Frame<'_>, layout: &Layout) -> Res
     let visible = Visible::find(graph, frame, &INFO, layout.samples)?;
     let (blocks, count, flagged) = empty_lists(graph, frame, layout)?;
     let shader = frame.shader(&format!("gbuffer_list/fill.comp{}", visible.tag('#')))?;
-    let mut pass = frame.compute(graph, "gbuffer-list/fill", &shader);
+    let mut pass = frame.compute(graph, "gbuffer-list/fill", PassRole::Geometry, &shader);
     for (name, value) in build_constants(frame, layout) {
         pass.constant(&name, value);
     }
@@ -315,8 +320,11 @@ fn fill_by_raster(graph: &mut Graph, frame: &Frame<'_>, layout: &Layout) -> Resu
             expected: "filter=depth-edges, or fill=compute".to_owned(),
         });
     }
-    let depth =
-        graph.image("gbuffer-list/depth", frame.multisampled_info(frame.small_depth_stencil_format()));
+    let depth = graph.image(
+        "gbuffer-list/depth",
+        BufferRole::Depth,
+        frame.multisampled_info(frame.small_depth_stencil_format()),
+    );
     let depth_only = SceneDraws::depth_only(frame)?;
     let (opaque, masked) = match layout.samples {
         1 => ("gbuffer_list/fill.frag#one", "gbuffer_list/fill.frag#one-mask"),
@@ -332,9 +340,9 @@ fn fill_by_raster(graph: &mut Graph, frame: &Frame<'_>, layout: &Layout) -> Resu
     let (blocks, count, flagged) = empty_lists(graph, frame, layout)?;
     let claims = claims(graph, frame, INFO.id, layout.samples);
 
-    let depth = depth_only.fill_depth(graph, frame, "gbuffer-list/depth", depth);
+    let depth = depth_only.fill_depth(graph, frame, ("gbuffer-list/depth", PassRole::DepthPrepass), depth);
 
-    let mut pass = graph.raster("gbuffer-list/fill");
+    let mut pass = graph.raster("gbuffer-list/fill", PassRole::Geometry);
     frame.bind_scene(&mut pass);
     pass.read("gbuffer_depth", &depth).read("SingleSampleDraws", &flagged);
     let blocks = pass.write("Blocks", blocks);

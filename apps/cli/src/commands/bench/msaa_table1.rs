@@ -5,7 +5,7 @@
 //! would take: the difference is the device's granularity.
 
 use afterlight_graph::gpu::vk;
-use afterlight_graph::{Graph, ImageHandle, ImageInfo, Load};
+use afterlight_graph::{BufferRole, Graph, ImageHandle, ImageInfo, Load, PassRole};
 use afterlight_measure::{Buffer, Memory, RunResult, Status};
 use afterlight_scene::{LoadOptions, load_source};
 use afterlight_techniques::{Params, Renderer, SceneGpu, Settings};
@@ -376,19 +376,19 @@ fn stencil_depth_bytes(base: &Renderer) -> u64 {
 
 /// Allocates the images of `deferred-ssaa` at one sample, which the technique does not render, and returns their bytes.
 fn single_sample_layout(base: &Renderer) -> Result<RunResult, Failure> {
-    const IMAGES: [(&str, vk::Format); 4] = [
-        ("base color", vk::Format::R8G8B8A8_SRGB),
-        ("normal", vk::Format::R16G16_UNORM),
-        ("roughness", vk::Format::R8G8B8A8_UNORM),
-        ("depth", vk::Format::D32_SFLOAT),
+    const IMAGES: [(&str, BufferRole, vk::Format); 4] = [
+        ("base color", BufferRole::Surfaces, vk::Format::R8G8B8A8_SRGB),
+        ("normal", BufferRole::Surfaces, vk::Format::R16G16_UNORM),
+        ("roughness", BufferRole::Surfaces, vk::Format::R8G8B8A8_UNORM),
+        ("depth", BufferRole::Depth, vk::Format::D32_SFLOAT),
     ];
     const TECHNIQUE: &str = "deferred-ssaa";
     let (width, height) = (base.settings().width_px, base.settings().height_px);
     let declare = |graph: &mut Graph, _: &ImageHandle| {
-        let images = IMAGES.map(|(name, format)| {
-            graph.image(&format!("{TECHNIQUE}/{name}"), ImageInfo::new(format, width, height))
+        let images = IMAGES.map(|(name, role, format)| {
+            graph.image(&format!("{TECHNIQUE}/{name}"), role, ImageInfo::new(format, width, height))
         });
-        let mut pass = graph.raster("bench/layout");
+        let mut pass = graph.raster("bench/layout", PassRole::Upkeep);
         let [base_color, normal, roughness, depth] = images;
         let mut written: Vec<ImageHandle> =
             [base_color, normal, roughness].map(|image| pass.color(image, Load::Clear([0.0; 4]))).into();
@@ -404,7 +404,7 @@ fn single_sample_layout(base: &Renderer) -> Result<RunResult, Failure> {
         .memory
         .iter()
         .filter(|one| one.name.starts_with(TECHNIQUE))
-        .map(|one| Buffer { name: one.name.clone(), bytes: one.bytes })
+        .map(|one| Buffer { name: one.name.clone(), role: Some(one.role), bytes: one.bytes })
         .collect();
     let bytes = buffers.iter().map(|one| one.bytes).sum();
     let reason = "allocated and cleared, not drawn to: the technique is for several samples";
@@ -726,7 +726,7 @@ mod tests {
             ("gbuffer-list/depth", pixels * 4 * depth_bytes),
             ("gbuffer-list/radiance", pixels * 8),
         ]
-        .map(|(name, bytes)| Buffer { name: name.into(), bytes })
+        .map(|(name, bytes)| Buffer { name: name.into(), role: None, bytes })
         .to_vec();
         result.memory = Some(Memory { technique_bytes: 0, peak_bytes: 0, buffers });
         result

@@ -2,7 +2,8 @@
 //! See the README of this folder.
 
 use afterlight_graph::{
-    Blend, BlendEquation, BufferHandle, DepthTest, DrawCall, Graph, ImageHandle, Load, RasterPass,
+    Blend, BlendEquation, BufferHandle, BufferRole, DepthTest, DrawCall, Graph, ImageHandle, Load, PassRole,
+    RasterPass,
     gpu::{self, vk},
 };
 
@@ -116,17 +117,22 @@ pub fn draw(
     let depth = opaque_depth(graph, frame)?;
     let lights = match frame.board.has::<VisitsAllLights>() {
         true => LightStep::All,
-        false => LightStep::anywhere(graph, frame, "shared/transparent")?,
+        false => LightStep::anywhere(
+            graph,
+            frame,
+            "shared/transparent",
+            (PassRole::Transparency, BufferRole::Transparency),
+        )?,
     };
     let drawn = BlendedDraws {
         lights,
-        indices: graph.import_buffer("blended indices", &list.indices),
-        commands: graph.import_buffer("blended draw commands", &list.commands),
-        count: graph.import_buffer("blended draw count", &list.count),
+        indices: graph.import_buffer("blended indices", BufferRole::Scene, &list.indices),
+        commands: graph.import_buffer("blended draw commands", BufferRole::Scene, &list.commands),
+        count: graph.import_buffer("blended draw count", BufferRole::Scene, &list.count),
         max: list.command_count,
     };
     if frame.samples == 1 {
-        let mut pass = graph.raster("shared/transparent");
+        let mut pass = graph.raster("shared/transparent", PassRole::Transparency);
         frame.bind_scene(&mut pass);
         let hdr = pass.color(hdr, Load::Keep);
         pass.depth_read_only(&depth);
@@ -135,9 +141,10 @@ pub fn draw(
         return Ok(hdr);
     }
     let format = vk::Format::R16G16B16A16_SFLOAT;
-    let samples = graph.image("shared/transparent samples", frame.multisampled_info(format));
-    let layers = graph.image("shared/transparent layers", frame.image_info(format));
-    let mut pass = graph.raster("shared/transparent");
+    let samples =
+        graph.image("shared/transparent samples", BufferRole::Transparency, frame.multisampled_info(format));
+    let layers = graph.image("shared/transparent layers", BufferRole::Transparency, frame.image_info(format));
+    let mut pass = graph.raster("shared/transparent", PassRole::Transparency);
     frame.bind_scene(&mut pass);
     let _samples = pass.color(samples, Load::Clear([0.0, 0.0, 0.0, 1.0]));
     let layers = pass.resolve(layers);
@@ -147,7 +154,7 @@ pub fn draw(
 
     let composite = shade::full_screen(frame, "compose/transparent/composite.frag", &[])?
         .blend(vec![LAYERS_OVER_RADIANCE]);
-    let mut pass = graph.raster("shared/transparent composite");
+    let mut pass = graph.raster("shared/transparent composite", PassRole::Transparency);
     pass.read("layers", &layers);
     let hdr = pass.color(hdr, Load::Keep);
     shade::draw_full_screen(&mut pass, composite, 0);
@@ -165,8 +172,13 @@ fn opaque_depth(graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, Tec
     if let Some(OpaqueDepth(depth)) = frame.board.take().filter(|OpaqueDepth(depth)| fits(depth)) {
         return Ok(depth);
     }
-    let depth = graph.image("shared/transparent depth", image);
-    Ok(SceneDraws::depth_only(frame)?.fill_depth(graph, frame, "shared/transparent depth", depth))
+    let depth = graph.image("shared/transparent depth", BufferRole::Transparency, image);
+    Ok(SceneDraws::depth_only(frame)?.fill_depth(
+        graph,
+        frame,
+        ("shared/transparent depth", PassRole::Transparency),
+        depth,
+    ))
 }
 
 /// A sorted list as the graph knows it, and how its surfaces find their lights.

@@ -5,7 +5,7 @@
 
 use std::f32::consts::{PI, TAU};
 
-use afterlight_graph::{BufferHandle, Graph, ImageHandle, ImageInfo, Load, gpu::vk};
+use afterlight_graph::{BufferHandle, BufferRole, Graph, ImageHandle, ImageInfo, Load, PassRole, gpu::vk};
 use afterlight_shader::structs::RsmConstants;
 
 use crate::{shared::light_view, surfaces::geometry::SceneDraws};
@@ -96,7 +96,7 @@ pub fn record(graph: &mut Graph, frame: &mut Frame<'_>, settings: &Settings) -> 
         }
     };
     let buffer = light_view::upload(frame.device, "shared/rsm constants", &constants)?;
-    let constants = graph.import_buffer("shared/rsm constants", &buffer);
+    let constants = graph.import_buffer("shared/rsm constants", BufferRole::Constants, &buffer);
     if images.is_some() {
         frame.board.put(IndirectLight { sample_count: SAMPLES as u32 });
     }
@@ -112,7 +112,11 @@ fn raster(
     light_index: u32,
 ) -> Result<RsmImages, TechniqueError> {
     let image = |graph: &mut Graph, name: &str, format| {
-        graph.image(&format!("shared/rsm {name}"), ImageInfo::new(format, size_px, size_px))
+        graph.image(
+            &format!("shared/rsm {name}"),
+            BufferRole::Shared,
+            ImageInfo::new(format, size_px, size_px),
+        )
     };
     let surface = image(graph, "surface", vk::Format::R32G32B32A32_UINT);
     let flux = image(graph, "flux", vk::Format::R16G16B16A16_SFLOAT);
@@ -120,7 +124,7 @@ fn raster(
     let mut surfaces =
         SceneDraws::shaded(frame, "shared/indirect/rsm.frag", "shared/indirect/rsm.frag#mask")?;
     surfaces.push = light_index.to_le_bytes().to_vec();
-    let mut pass = graph.raster("shared/rsm");
+    let mut pass = graph.raster("shared/rsm", PassRole::Shared);
     frame.bind_scene(&mut pass);
     // A texel without flux gives nothing, wherever it is.
     let images = RsmImages {

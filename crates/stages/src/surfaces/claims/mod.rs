@@ -1,7 +1,7 @@
 //! Claims: how fragments that come in any order share the samples of a pixel among surfaces of one depth.
 
 use afterlight_frame::Frame;
-use afterlight_graph::{BufferHandle, Graph, StencilFace, StencilTest, gpu::vk};
+use afterlight_graph::{BufferHandle, BufferRole, Graph, PassRole, StencilFace, StencilTest, gpu::vk};
 
 /// Passes where no fragment before has set the stencil bit, and leaves it.
 pub const NOT_TAKEN: StencilTest = {
@@ -15,7 +15,11 @@ pub fn claims(graph: &mut Graph, frame: &Frame<'_>, technique: &str, samples: u3
     frame.scene.has_masked().then(|| {
         let bits = if samples > 8 { 16 } else { 8 };
         let pixels = u64::from(frame.width_px) * u64::from(frame.height_px);
-        let claims = graph.buffer(&format!("{technique}/claims"), 4 * (pixels * bits).div_ceil(32));
-        graph.clear_buffer(&format!("{technique}/clear claims"), claims, 0)
+        let claims = graph.buffer(
+            &format!("{technique}/claims"),
+            BufferRole::Claims,
+            4 * (pixels * bits).div_ceil(32),
+        );
+        graph.clear_buffer(&format!("{technique}/clear claims"), PassRole::Geometry, claims, 0)
     })
 }

@@ -1,7 +1,9 @@
 //! Depth alone first, then forward shading of what is visible: by a loop over all lights, or by the lists of lights of a light step.
 
 use afterlight_frame::{Frame, Info, OpaqueDepth, TechniqueError, views::INVOCATIONS};
-use afterlight_graph::{DepthTest, Graph, ImageHandle, Load, RasterPass, StencilFace, StencilTest, gpu::vk};
+use afterlight_graph::{
+    BufferRole, DepthTest, Graph, ImageHandle, Load, PassRole, RasterPass, StencilFace, StencilTest, gpu::vk,
+};
 
 use crate::{
     lights::{
@@ -33,8 +35,9 @@ pub fn draw_depth(
     technique: &str,
 ) -> Result<ImageHandle, TechniqueError> {
     let name = format!("{technique}/depth");
-    let depth = graph.image(&name, frame.multisampled_info(vk::Format::D32_SFLOAT_S8_UINT));
-    Ok(SceneDraws::depth_only(frame)?.fill_depth(graph, frame, &name, depth))
+    let depth =
+        graph.image(&name, BufferRole::Depth, frame.multisampled_info(vk::Format::D32_SFLOAT_S8_UINT));
+    Ok(SceneDraws::depth_only(frame)?.fill_depth(graph, frame, (&name, PassRole::DepthPrepass), depth))
 }
 
 /// Declares the pass `technique/shade`: surfaces where `depth`, of [`draw_depth`], is equal, each shaded by `shader`, which ends in
@@ -56,7 +59,7 @@ pub fn shade_visible(
         .depth(DepthTest::EQUAL)
         .stencil(FIRST_FRAGMENT, 1);
     shaded.constants = constants;
-    let mut pass = graph.raster(&format!("{technique}/shade"));
+    let mut pass = graph.raster(&format!("{technique}/shade"), PassRole::Shading);
     frame.bind_scene(&mut pass);
     bind_lights(&mut pass);
     let radiance = target.attach(frame, &mut pass);

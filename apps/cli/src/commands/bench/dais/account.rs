@@ -7,7 +7,7 @@
 //! compresses attachments can stay below the floor.
 
 use afterlight_graph::gpu::Device;
-use afterlight_graph::{Executor, Graph};
+use afterlight_graph::{BufferRole, Executor, Graph, PassRole};
 use afterlight_measure::{Buffer, Pass, RunResult, Spread};
 use serde::Serialize;
 
@@ -38,10 +38,10 @@ impl Bandwidth {
         let limit = device.features().max_storage_buffer_range.min(COPY_BYTES.1);
         let bytes = frame_bytes.clamp(COPY_BYTES.0.min(limit), limit) / 4 * 4;
         let mut graph = Graph::new();
-        let source = graph.buffer("bench/source", bytes);
-        let source = graph.clear_buffer("bench/fill", source, 1);
-        let copy = graph.buffer("bench/copy", bytes);
-        let copy = graph.copy_buffer("bench/copy", &source, copy);
+        let source = graph.buffer("bench/source", BufferRole::Counters, bytes);
+        let source = graph.clear_buffer("bench/fill", PassRole::Upkeep, source, 1);
+        let copy = graph.buffer("bench/copy", BufferRole::Counters, bytes);
+        let copy = graph.copy_buffer("bench/copy", PassRole::Upkeep, &source, copy);
         graph.keep(&copy);
         let mut executor = Executor::new(device, graph.plan(device)?)?;
         let mut times_ms = [Vec::new(), Vec::new()];
@@ -173,10 +173,14 @@ mod tests {
 
     fn pass(name: &str, reads: &[(&str, u64)], writes: &[(&str, u64)]) -> Pass {
         let buffers = |all: &[(&str, u64)]| {
-            all.iter().map(|(name, bytes)| Buffer { name: (*name).into(), bytes: *bytes }).collect()
+            all.iter()
+                .map(|(name, bytes)| Buffer { name: (*name).into(), role: None, bytes: *bytes })
+                .collect()
         };
         Pass {
             name: name.into(),
+            role: None,
+            work: None,
             ms: Spread::of(&[2.0]),
             reads: buffers(reads),
             writes: buffers(writes),

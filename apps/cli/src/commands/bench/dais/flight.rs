@@ -361,7 +361,7 @@ pub(super) fn claim(
 pub(super) mod tests {
     use super::*;
     use crate::args::{Cli, Command};
-    use afterlight_measure::{Buffer, Memory, Pass};
+    use afterlight_measure::{Buffer, BufferRole, Memory, Pass};
     use clap::Parser as _;
 
     /// Arguments of an experiment.
@@ -383,6 +383,8 @@ pub(super) mod tests {
             result.reason = None;
             let pass = |name: &str, ms: f64, triangles: u64| Pass {
                 name: name.into(),
+                role: None,
+                work: None,
                 ms: Spread::of(&[ms]),
                 reads: Vec::new(),
                 writes: Vec::new(),
@@ -393,7 +395,11 @@ pub(super) mod tests {
                 pass(&format!("{}/gbuffer", kind.technique()), geometry_ms, 70),
                 pass(&format!("{}/shade", kind.technique()), 50.0, 0),
             ];
-            let buffers = vec![Buffer { name: "dais/ids".into(), bytes: mib << 20 }];
+            let buffers = vec![Buffer {
+                name: "dais/ids".into(),
+                role: Some(BufferRole::Visibility),
+                bytes: mib << 20,
+            }];
             result.memory = Some(Memory { technique_bytes: 0, peak_bytes: 0, buffers });
             cell(&Column { kind: *kind, setup: None }, &result, view as f32)
         };
