@@ -2,17 +2,13 @@
 
 use std::path::PathBuf;
 
+use afterlight_experiments::{EXPERIMENTS, Options};
+use afterlight_lab::FrameSpec;
+use afterlight_lab::spec::{DEFAULT_SCENE, FRAMES_MAX, LIGHTS_MAX};
 use afterlight_techniques::geometry::{MAX_DISPLACEMENT_M, MAX_TESSELLATE_PX, MIN_TESSELLATE_PX};
-use clap::parser::ValueSource;
-use clap::{ArgMatches, Args, FromArgMatches, Parser, Subcommand, ValueEnum};
+use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::failure::Failure;
-
-/// Most lights that `--lights` takes.
-const LIGHTS_MAX: i64 = 1_000_000;
-
-/// The scene where none is named.
-pub const DEFAULT_SCENE: &str = "builtin:colonnade";
 
 /// A workbench of deferred-shading techniques: one scene, one image, many ways, each one timed.
 #[derive(Debug, Parser)]
@@ -122,8 +118,11 @@ pub struct CompareArgs {
     #[arg(long, value_name = "ID", default_value = "forward")]
     pub reference: String,
     /// Frames measured of each technique, after a warm-up frame
-    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=i64::from(FRAMES_MAX)))]
     pub frames: u32,
+    /// Show the passes of every technique as well
+    #[arg(long)]
+    pub passes: bool,
     /// Write an HTML report (report.html) and its figures (report.json) into DIR
     #[arg(long, value_name = "DIR")]
     pub report: Option<PathBuf>,
@@ -133,38 +132,72 @@ pub struct CompareArgs {
     pub common: CommonArgs,
 }
 
-/// Arguments of `bench`.
+/// Options that a specification holds, so that they cannot stand beside `--spec`.
+const NOT_WITH_SPEC: &[&str] = &[
+    "scale",
+    "scenes",
+    "light_counts",
+    "techniques",
+    "frames",
+    "max_pairs",
+    "max_commands",
+    "views",
+    "path",
+    "width",
+    "height",
+    "samples",
+    "lights",
+    "light_seed",
+    "camera",
+    "set",
+    "device",
+    "time",
+    "post",
+    "tessellate",
+    "displacement",
+    "shadows",
+    "shadow_map_size",
+    "indirect",
+    "transparency",
+    "view",
+    "validate",
+];
+
+/// Arguments of `bench`. What is not given is the experiment's own.
 #[derive(Clone, Debug, Args)]
 pub struct BenchArgs {
-    /// Which options were given: experiments have sizes of their own.
-    #[command(flatten)]
-    pub given: Given,
-    #[arg(value_name = "EXPERIMENT|all", help = crate::commands::bench::help())]
+    #[arg(value_name = "EXPERIMENT|all", help = experiments_help())]
     pub experiment: String,
-    /// Share of the experiment's width and height, and of the most lights of lights-sweep; triangles go by its square
-    #[arg(long, value_name = "F", default_value_t = 1.0, value_parser = share)]
-    pub scale: f64,
-    /// Scenes; msaa-table2 has three of its own, the dais experiments two
-    #[arg(long, alias = "scene", value_name = "SCENE,SCENE…", value_delimiter = ',', default_value = DEFAULT_SCENE)]
-    pub scenes: Vec<String>,
-    /// Numbers of seeded lights; msaa-table2 has its own, 5 and 50, lights-sweep 1 to 100,000
-    #[arg(long, value_name = "N,N…", value_delimiter = ',', default_value = "100,1000", value_parser = clap::value_parser!(u32).range(0..=LIGHTS_MAX))]
-    pub light_counts: Vec<u32>,
-    /// Techniques, by their ids, or all
-    #[arg(long, value_name = "ID,ID…|all", value_delimiter = ',', default_value = "all")]
-    pub techniques: Vec<String>,
-    /// Frames measured of each technique, after a warm-up frame; lights-sweep has its own, 3
-    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=10_000))]
-    pub frames: u32,
+    /// The experiment's specification, a JSON file, in the place of all options but --report, --json and --quiet
+    #[arg(long, value_name = "FILE.json", conflicts_with_all = NOT_WITH_SPEC)]
+    pub spec: Option<PathBuf>,
+    /// Print the specification that the options give, and run nothing
+    #[arg(long)]
+    pub show_spec: bool,
+    /// Share of the experiment's width and height, and of the most lights of lights-sweep; triangles go by its square [default: 1]
+    #[arg(long, value_name = "F", value_parser = share)]
+    pub scale: Option<f64>,
+    /// Scenes; lights-sweep, msaa-table2 and the dais experiments have their own [default: builtin:colonnade]
+    #[arg(long, alias = "scene", value_name = "SCENE,SCENE…", value_delimiter = ',')]
+    pub scenes: Option<Vec<String>>,
+    /// Numbers of seeded lights; msaa-table2 has its own, 5 and 50, lights-sweep 1 to 100,000 [default: 100,1000]
+    #[arg(long, value_name = "N,N…", value_delimiter = ',', value_parser = clap::value_parser!(u32).range(0..=i64::from(LIGHTS_MAX)))]
+    pub light_counts: Option<Vec<u32>>,
+    /// Techniques, by their ids, or all [default: all]
+    #[arg(long, value_name = "ID,ID…|all", value_delimiter = ',')]
+    pub techniques: Option<Vec<String>>,
+    /// Frames measured of each technique, after a warm-up frame; lights-sweep has its own, 3 [default: 5]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(FRAMES_MAX)))]
+    pub frames: Option<u32>,
     /// Predicted pairs of a light and a surface a frame beyond which a technique is left out (lights-sweep)
     #[arg(long, value_name = "N")]
     pub max_pairs: Option<u64>,
     /// Predicted draws a frame beyond which a technique is left out (lights-sweep)
     #[arg(long, value_name = "N")]
     pub max_commands: Option<u64>,
-    /// Views along the camera path (dais-fig5, dais-fig7)
-    #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=10_000))]
-    pub views: u32,
+    /// Views along the camera path (dais-fig5, dais-fig7) [default: 16]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub views: Option<u32>,
     /// Camera path, a JSON file; else a fly-through of the scene (the dais experiments)
     #[arg(long, value_name = "FILE.json")]
     pub path: Option<PathBuf>,
@@ -177,51 +210,31 @@ pub struct BenchArgs {
     pub common: CommonArgs,
 }
 
-/// Options of `bench` that were on the command line, so that experiments know their own from what was asked for.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Given {
-    /// `--width` or `--height`.
-    pub size: bool,
-    /// `--samples`.
-    pub samples: bool,
-    /// `--scenes`.
-    pub scenes: bool,
-    /// `--light-counts`.
-    pub light_counts: bool,
-    /// `--techniques`.
-    pub techniques: bool,
-    /// `--frames`.
-    pub frames: bool,
-}
-
-/// Reads nothing of its own: it looks where the values of others come from, and so stands before them in its struct.
-impl FromArgMatches for Given {
-    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
-        let given = |id: &str| matches.value_source(id) == Some(ValueSource::CommandLine);
-        Ok(Given {
-            size: given("width") || given("height"),
-            samples: given("samples"),
-            scenes: given("scenes"),
-            light_counts: given("light_counts"),
-            techniques: given("techniques"),
-            frames: given("frames"),
+impl BenchArgs {
+    /// The options as experiments take them.
+    pub fn options(&self) -> Result<Options, Failure> {
+        let common = &self.common;
+        Ok(Options {
+            scale: self.scale,
+            scenes: self.scenes.clone(),
+            light_counts: self.light_counts.clone(),
+            techniques: self.techniques.clone(),
+            frames: self.frames,
+            max_pairs: self.max_pairs,
+            max_commands: self.max_commands,
+            views: self.views,
+            path: self.path.clone(),
+            width: common.width,
+            height: common.height,
+            samples: common.samples,
+            frame: common.spec()?,
         })
     }
-
-    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
-        *self = Given::from_arg_matches(matches)?;
-        Ok(())
-    }
 }
 
-impl Args for Given {
-    fn augment_args(command: clap::Command) -> clap::Command {
-        command
-    }
-
-    fn augment_args_for_update(command: clap::Command) -> clap::Command {
-        command
-    }
+fn experiments_help() -> String {
+    let list: String = EXPERIMENTS.iter().map(|one| format!(" {} ({});", one.name, one.summary)).collect();
+    format!("Experiment:{list} or all")
 }
 
 /// Arguments of `completions`.
@@ -234,17 +247,17 @@ pub struct CompletionsArgs {
 /// Options of every command that renders.
 #[derive(Clone, Debug, Args)]
 pub struct CommonArgs {
-    /// Image width, pixels
-    #[arg(long, value_name = "W", default_value_t = 1280, value_parser = clap::value_parser!(u32).range(1..))]
-    pub width: u32,
-    /// Image height, pixels
-    #[arg(long, value_name = "H", default_value_t = 720, value_parser = clap::value_parser!(u32).range(1..))]
-    pub height: u32,
-    /// Samples a pixel
-    #[arg(long, value_name = "1|2|4|8|16", default_value = "1", value_parser = samples)]
-    pub samples: u32,
+    /// Image width, pixels [default: 1280, or an experiment's own]
+    #[arg(long, value_name = "W", value_parser = clap::value_parser!(u32).range(1..))]
+    pub width: Option<u32>,
+    /// Image height, pixels [default: 720, or an experiment's own]
+    #[arg(long, value_name = "H", value_parser = clap::value_parser!(u32).range(1..))]
+    pub height: Option<u32>,
+    /// Samples a pixel [default: 1, or an experiment's own]
+    #[arg(long, value_name = "1|2|4|8|16", value_parser = samples)]
+    pub samples: Option<u32>,
     /// Number of seeded point lights; 0 keeps the scene's own lights
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=LIGHTS_MAX))]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=i64::from(LIGHTS_MAX)))]
     pub lights: u32,
     /// Seed of the lights
     #[arg(long, value_name = "SEED", default_value_t = 1)]
@@ -321,17 +334,6 @@ pub enum Shadows {
     Pcss,
 }
 
-impl Shadows {
-    /// What the techniques make of it; `None` where they have it not yet.
-    pub fn setting(self) -> Option<afterlight_techniques::Shadows> {
-        match self {
-            Shadows::None => Some(afterlight_techniques::Shadows::None),
-            Shadows::Map => Some(afterlight_techniques::Shadows::Map),
-            Shadows::Pcss => None,
-        }
-    }
-}
-
 /// `--transparency`
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Transparency {
@@ -365,34 +367,40 @@ impl From<Indirect> for afterlight_techniques::Indirect {
 }
 
 impl CommonArgs {
-    /// Refuses what this version does not have yet.
-    pub fn check(&self) -> Result<(), Failure> {
-        let not_yet = |name: &str, found: &str, expected: &str| {
-            Err(Failure::option(
-                name,
-                found,
-                format!("{expected} (nothing else is available in this version)"),
-            ))
+    /// The frames that the options ask for; refuses what this version does not have yet, and what does not go together.
+    pub fn spec(&self) -> Result<FrameSpec, Failure> {
+        let shadows = match self.shadows {
+            Shadows::None => afterlight_techniques::Shadows::None,
+            Shadows::Map => afterlight_techniques::Shadows::Map,
+            Shadows::Pcss => {
+                let expected = "none or map (nothing else is available in this version)";
+                return Err(Failure::option("--shadows", "pcss", expected));
+            }
         };
-        if self.post != Post::None && self.view != afterlight_techniques::view::FINAL {
-            let expected = "none with a debug view (its colours are values, which no filter may mix)";
-            return Err(Failure::option("--post", name_of(self.post), expected));
-        }
-        if self.shadows.setting().is_none() {
-            return not_yet("--shadows", &name_of(self.shadows), "none or map");
-        }
-        if let Some(size) = self.shadow_map_size
-            && (self.shadows, self.indirect) == (Shadows::None, Indirect::None)
-        {
-            let expected = "no such option without --shadows map or --indirect rsm";
-            return Err(Failure::option("--shadow-map-size", size, expected));
-        }
-        Ok(())
+        let usual = FrameSpec::default();
+        let spec = FrameSpec {
+            width: self.width.unwrap_or(usual.width),
+            height: self.height.unwrap_or(usual.height),
+            samples: self.samples.unwrap_or(usual.samples),
+            lights: self.lights,
+            light_seed: self.light_seed,
+            camera: self.camera.clone(),
+            set: self.set.clone(),
+            device: self.device.clone(),
+            time_s: self.time,
+            post: self.post.into(),
+            tessellate_px: self.tessellate,
+            displacement_mm: self.displacement,
+            shadows,
+            shadow_map_size: self.shadow_map_size,
+            indirect: self.indirect.into(),
+            transparency: self.transparency.into(),
+            view: self.view.clone(),
+            validate: self.validate,
+        };
+        spec.check()?;
+        Ok(spec)
     }
-}
-
-fn name_of(value: impl ValueEnum) -> String {
-    value.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
 }
 
 fn samples(text: &str) -> Result<u32, String> {
@@ -468,22 +476,33 @@ mod tests {
     }
 
     #[test]
+    fn a_specification_stands_for_other_options() {
+        let parse = |more: &[&str]| {
+            Cli::try_parse_from(["afterlight", "bench", "speed", "--spec", "a.json"].iter().chain(more))
+        };
+        assert!(parse(&["--quiet", "--report", "r", "--json"]).is_ok());
+        for option in [["--scale", "0.5"], ["--width", "64"], ["--shadows", "map"]] {
+            assert!(parse(&option).is_err(), "{option:?}");
+        }
+    }
+
+    #[test]
     fn what_is_not_there_yet_is_refused() {
         for option in [["--shadows", "pcss"], ["--shadow-map-size", "512"]] {
-            let failure = compare(&option).common.check().expect_err("is refused");
+            let failure = compare(&option).common.spec().expect_err("is refused");
             let line = failure.lines().remove(0);
             assert_eq!(failure.code(), 2);
             assert!(line.starts_with(option[0]) && line.contains("expected"), "{line}");
         }
         for post in ["none", "fxaa", "smaa", "sraa"] {
-            assert!(compare(&["--post", post]).common.check().is_ok(), "{post}");
+            assert!(compare(&["--post", post]).common.spec().is_ok(), "{post}");
         }
-        let failure = compare(&["--post", "fxaa", "--view", "edges"]).common.check().expect_err("is refused");
+        let failure = compare(&["--post", "fxaa", "--view", "edges"]).common.spec().expect_err("is refused");
         assert!(failure.lines()[0].starts_with("--post: found fxaa, expected none"));
         for option in [["--indirect", "rsm"], ["--shadows", "map"]] {
             let sized = [&option[..], &["--shadow-map-size", "256"]].concat();
-            assert!(compare(&sized).common.check().is_ok(), "{sized:?}");
+            assert!(compare(&sized).common.spec().is_ok(), "{sized:?}");
         }
-        assert!(compare(&["--camera", "-1,0,0,0,0,0,60"]).common.check().is_ok());
+        assert!(compare(&["--camera", "-1,0,0,0,0,0,60"]).common.spec().is_ok());
     }
 }

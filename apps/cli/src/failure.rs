@@ -2,8 +2,13 @@
 
 use afterlight_graph::GraphError;
 use afterlight_graph::gpu::GpuError;
+use afterlight_image::ImageError;
+use afterlight_lab::LabError;
+use afterlight_report::FileError;
 use afterlight_scene::SceneError;
 use afterlight_techniques::TechniqueError;
+
+use crate::output::one_line;
 
 /// Exit code of a check that failed, and of a device or disk that broke off.
 pub const FAILED: u8 = 1;
@@ -51,13 +56,11 @@ impl Failure {
     pub fn lines(&self) -> Vec<String> {
         match self {
             Failure::Failed(text) | Failure::Input(text) | Failure::NoDevice(text) => {
-                vec![crate::text::one_line(text)]
+                vec![one_line(text)]
             }
             Failure::Validation(messages) => {
-                let mut lines: Vec<String> = messages
-                    .iter()
-                    .map(|message| format!("validation: {}", crate::text::one_line(message)))
-                    .collect();
+                let mut lines: Vec<String> =
+                    messages.iter().map(|message| format!("validation: {}", one_line(message))).collect();
                 lines.push(format!("{} Vulkan validation message(s), expected none", messages.len()));
                 lines
             }
@@ -108,6 +111,44 @@ impl From<TechniqueError> for Failure {
             TechniqueError::Graph(error) => error.into(),
             TechniqueError::UnknownShader { .. } => Failure::Failed(error.to_string()),
             _ => Failure::Input(error.to_string()),
+        }
+    }
+}
+
+impl From<ImageError> for Failure {
+    fn from(error: ImageError) -> Failure {
+        match error {
+            ImageError::Io { .. } => Failure::Input(error.to_string()),
+            other => Failure::Failed(other.to_string()),
+        }
+    }
+}
+
+impl From<FileError> for Failure {
+    fn from(error: FileError) -> Failure {
+        match error {
+            FileError::Image(error) => error.into(),
+            FileError::Folder { .. } | FileError::Place { .. } => Failure::Input(error.to_string()),
+            FileError::Json(_) => Failure::Failed(error.to_string()),
+        }
+    }
+}
+
+impl From<LabError> for Failure {
+    fn from(error: LabError) -> Failure {
+        match error {
+            // The library names settings; the options of those names begin with two dashes.
+            LabError::Setting { name, found, expected } => {
+                Failure::option(&format!("--{name}"), found, expected)
+            }
+            LabError::Specification { .. } => Failure::Input(error.to_string()),
+            LabError::Scene(error) => error.into(),
+            LabError::Gpu(error) => error.into(),
+            LabError::Graph(error) => error.into(),
+            LabError::Technique(error) => error.into(),
+            LabError::Image(error) => error.into(),
+            LabError::Json(_) | LabError::BrokeOff { .. } => Failure::Failed(error.to_string()),
+            LabError::Validation(messages) => Failure::Validation(messages),
         }
     }
 }

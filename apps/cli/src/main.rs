@@ -3,12 +3,8 @@
 mod args;
 mod commands;
 mod failure;
-mod frames;
 mod output;
-mod pictures;
 mod progress;
-mod session;
-mod text;
 
 use std::io::Write as _;
 use std::process::ExitCode;
@@ -60,7 +56,7 @@ fn told_by_clap(error: &clap::Error) -> ExitCode {
             ExitCode::from(failure::BAD_INPUT)
         }
         _ => {
-            eprintln!("afterlight: {}", text::one_line(&error.to_string()));
+            eprintln!("afterlight: {}", output::one_line(&error.to_string()));
             ExitCode::from(failure::BAD_INPUT)
         }
     }

@@ -1,7 +1,8 @@
-//! Statistics, run records, the cost model.
+//! Statistics and run records.
 //!
 //! [`Run`] is the JSON that `compare` and `bench` write: schema 1, stable names. [`Spread`] is how every measured time is
-//! told: median, least and greatest of the frames.
+//! told: median, least and greatest of the frames. Predicted costs are kept beside what was measured ([`CostRecord`]); the
+//! formulas that predict them stand with the techniques, not here.
 
 mod record;
 mod stats;

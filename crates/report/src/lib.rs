@@ -1,11 +1,18 @@
-//! One-file HTML reports: a summary, sortable tables, pass times as bars, charts, pictures inlined; light and dark.
+//! Reports of runs: one-file HTML pages (a summary, sortable tables, pass times as bars, charts, pictures inlined; light and
+//! dark), tables for the terminal, and files that are complete or absent. Nothing here prints.
 
 mod chart;
+mod files;
 mod format;
 mod page;
+mod pictures;
+pub mod text;
 
 pub use chart::{Axes, Chart, Line};
+pub use files::{FileError, check_file, json_text, make_folder, write_file, write_report};
 pub use format::{bytes_text, ms_text, psnr_text};
+
+pub use pictures::AMPLIFICATION;
 
 use afterlight_measure::Run;
 

@@ -7,3 +7,17 @@ pub mod devices;
 pub mod render;
 pub mod scene;
 pub mod techniques;
+
+use afterlight_lab::{Listener, Session};
+
+/// Tells what was tolerated in the scene.
+fn tell_warnings(session: &Session, listener: &dyn Listener) {
+    /// Warnings told in full; `afterlight scene` tells all.
+    const TOLD_MAX: usize = 5;
+    for warning in session.warnings.iter().take(TOLD_MAX) {
+        listener.warn(warning);
+    }
+    if session.warnings.len() > TOLD_MAX {
+        listener.warn(&format!("{} more, see `afterlight scene`", session.warnings.len() - TOLD_MAX));
+    }
+}

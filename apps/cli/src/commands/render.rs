@@ -3,15 +3,15 @@
 use std::path::Path;
 use std::time::Instant;
 
+use afterlight_image::{write_exr, write_png};
+use afterlight_lab::{Listener as _, Measured, Session, choose, measure, ms_since};
 use afterlight_measure::{ProcessRecord, Run, SCHEMA, Status};
+use afterlight_report::{check_file, json_text, write_file};
+use afterlight_techniques::Post;
 
 use crate::args::RenderArgs;
 use crate::failure::Failure;
-use crate::frames::{self, Measured};
-use crate::output;
-use crate::pictures;
-use crate::progress::Progress;
-use crate::session::{self, Session, ms_since};
+use crate::progress::Terminal;
 
 /// What the image file's name asks for.
 #[derive(Clone, Copy, PartialEq)]
@@ -30,28 +30,26 @@ fn format_of(path: &Path) -> Result<Format, Failure> {
 
 pub fn run(args: &RenderArgs) -> Result<(), Failure> {
     let start = Instant::now();
-    let common = &args.common;
-    common.check()?;
+    let spec = args.common.spec()?;
     let format = format_of(&args.output)?;
-    let post = afterlight_techniques::Post::from(common.post);
-    if format == Format::Exr && post != afterlight_techniques::Post::None {
+    if format == Format::Exr && spec.post != Post::None {
         let expected = "none for linear radiance (the filters work on the image that a .png shows)";
-        return Err(Failure::option("--post", post.name(), expected));
+        return Err(Failure::option("--post", spec.post.name(), expected));
     }
-    output::check_file(&args.output)?;
+    check_file(&args.output)?;
     if let Some(stats) = &args.stats {
-        output::check_file(stats)?;
+        check_file(stats)?;
     }
-    let chosen = session::choose("--technique", std::slice::from_ref(&args.technique), &common.set)?;
+    let chosen = choose("technique", std::slice::from_ref(&args.technique), &spec.set)?;
     let [chosen] = &chosen[..] else {
         return Err(Failure::option("--technique", format!("{:?}", args.technique), "one technique"));
     };
-    let progress = Progress::new(common.quiet);
-    let session = Session::open(&args.scene, common, format == Format::Exr, &progress)?;
-    tell_warnings(&session, common.quiet);
-    let spinner = progress.spinner(&format!("rendering with {}", chosen.id()));
-    let measured = frames::measure(&session.renderer, chosen, &session.workload, 0, || {})?;
-    spinner.finish_and_clear();
+    let terminal = Terminal::new(args.common.quiet, None, false);
+    let session = Session::open(&args.scene, &spec, format == Format::Exr, &terminal)?;
+    super::tell_warnings(&session, &terminal);
+    let task = terminal.task(&format!("rendering with {}", chosen.id()), 0);
+    let measured = measure(&session.renderer, chosen, &session.workload, 0, || {})?;
+    drop(task);
     let Measured { result, image, radiance } = measured;
     let Some(image) = image else {
         let reason = result.reason.unwrap_or_default();
@@ -61,8 +59,8 @@ pub fn run(args: &RenderArgs) -> Result<(), Failure> {
         });
     };
     match (format, radiance) {
-        (Format::Exr, Some(radiance)) => pictures::write_exr(&args.output, &radiance)?,
-        _ => pictures::write_png(&args.output, &image)?,
+        (Format::Exr, Some(radiance)) => write_exr(&args.output, &radiance)?,
+        _ => write_png(&args.output, &image)?,
     }
     let first_image_ms = ms_since(start);
     // An image for which something was dropped is written, and said to be so.
@@ -72,7 +70,7 @@ pub fn run(args: &RenderArgs) -> Result<(), Failure> {
             schema: SCHEMA,
             device: session.device.clone(),
             scene: session.scene.clone(),
-            settings: session.settings_record(common, 1, chosen.id()),
+            settings: session.settings_record(&spec, 1, chosen.id()),
             results: vec![result],
             process: Some(ProcessRecord {
                 load_ms: session.start_up.load_ms,
@@ -81,25 +79,10 @@ pub fn run(args: &RenderArgs) -> Result<(), Failure> {
                 peak_resident_bytes: peak_resident_bytes(),
             }),
         };
-        output::write_file(path, output::json_text(&run)?.as_bytes())?;
+        write_file(path, json_text(&run)?.as_bytes())?;
     }
-    session.finish(common, common.quiet)?;
+    session.finish(&spec, &terminal)?;
     dropped.map_or(Ok(()), |reason| Err(Failure::Failed(reason)))
-}
-
-/// Tells what was tolerated in the scene.
-pub fn tell_warnings(session: &Session, quiet: bool) {
-    /// Warnings told in full; `afterlight scene` tells all.
-    const TOLD_MAX: usize = 5;
-    if quiet {
-        return;
-    }
-    for warning in session.warnings.iter().take(TOLD_MAX) {
-        eprintln!("afterlight: warning: {}", crate::text::one_line(warning));
-    }
-    if session.warnings.len() > TOLD_MAX {
-        eprintln!("afterlight: warning: {} more, see `afterlight scene`", session.warnings.len() - TOLD_MAX);
-    }
 }
 
 /// The most memory that this process ever held, as Linux counts it; none elsewhere.

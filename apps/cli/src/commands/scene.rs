@@ -3,13 +3,13 @@
 use std::fmt::Write as _;
 
 use afterlight_report::bytes_text;
+use afterlight_report::text::grouped;
 use afterlight_scene::{AlphaMode, LightKind, LoadOptions, Projection, Scene, VertexAttributes, load_source};
 use serde_json::{Value, json};
 
 use crate::args::SceneArgs;
 use crate::failure::Failure;
 use crate::output;
-use crate::text::grouped;
 
 pub fn run(args: &SceneArgs) -> Result<(), Failure> {
     args.json.check()?;
