@@ -22,10 +22,7 @@ fn build() -> Result<(), Box<dyn Error>> {
     let mut folders = Vec::new();
     collect(&src, &mut folders)?;
     folders.sort();
-    let mut builder = Builder::new()
-        .include_dir(&src)
-        .include_dir(src.join("../../techniques/src"))
-        .layouts(structs::LAYOUTS);
+    let mut builder = Builder::new().include_dir(&src).layouts(structs::LAYOUTS);
     for folder in &folders {
         let name = folder.strip_prefix(&src)?.to_string_lossy().replace('\\', "/");
         builder = builder.folder(name, folder);

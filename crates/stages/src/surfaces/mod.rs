@@ -6,6 +6,7 @@ pub mod depth_first;
 pub mod gbuffer;
 pub mod geometry;
 mod radiance_target;
+pub mod samples;
 pub mod shade;
 pub mod triangles;
 pub mod visible;

@@ -1,16 +1,13 @@
-// The triangle records that a pixel's samples refer to, whatever holds them: source_begin(pixel), then source_next_triangle(name,
-// weight) until it is false, and source_place(name), as in triangle_buffer/surface.glsl.
+// The triangle records that a pixel's samples refer to, whatever holds them. A technique names the header that is included as "source" in
+// its variants.txt: source_begin(pixel), then source_next_triangle(name, weight) until it is false, and source_place(name), as in
+// surfaces/triangles/surface.glsl.
 #ifndef AFTERLIGHT_VIEW_RECORDS
 #define AFTERLIGHT_VIEW_RECORDS
 #include "frame.glsl"
 #include "material.glsl"
 #include "surfaces/visible/sample_depth.glsl"
 
-#if defined(SOURCE_DAIS)
-#include "dais/source_dais.glsl"
-#else
-#include "dais_list/source_dais_list.glsl"
-#endif
+#include "source"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 

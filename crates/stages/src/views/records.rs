@@ -2,6 +2,7 @@
 
 use afterlight_graph::{BufferRole, ComputePass, Graph, ImageHandle, Load, PassRole, gpu::vk};
 
+use crate::surfaces::shade::SurfaceSource;
 use crate::surfaces::{geometry::SceneDraws, triangles::Records};
 use afterlight_frame::views::TEXTURE_ERROR;
 use afterlight_frame::{Frame, SourceSlots, TechniqueError};
@@ -23,10 +24,8 @@ const NO_TRIANGLE_UINT: [u32; 4] = [u32::MAX; 4];
 pub struct RecordSource<'a> {
     /// The technique.
     pub technique: &'static str,
-    /// Tag of the shader variants that read it, as of `multisample/shade.comp`.
-    pub tag: &'a str,
-    /// Samples a pixel.
-    pub samples: u32,
+    /// Where its variants of the views' templates are listed.
+    pub source: SurfaceSource<'a>,
     /// The records.
     pub records: &'a Records,
     /// Binds what it reads, the records as well.
@@ -139,9 +138,9 @@ impl RecordSource<'_> {
         stage: &str,
         shader: &str,
     ) -> Result<ComputePass<'g>, TechniqueError> {
-        let shader = frame.shader(&format!("view/{shader}.comp#{}", self.tag))?;
+        let shader = frame.shader(&self.source.shader(&format!("{shader}.comp")))?;
         let mut pass = frame.compute(graph, &self.name(stage), PassRole::Upkeep, &shader);
-        pass.constant("SAMPLES", self.samples);
+        pass.constant("SAMPLES", self.source.samples);
         (self.bind)(&mut pass);
         Ok(pass)
     }

@@ -19,6 +19,7 @@ use afterlight_frame::{
 use afterlight_shader::Shader;
 use afterlight_stages::{
     lights::{cells, step},
+    surfaces::shade::SurfaceSource,
     surfaces::{
         compute_raster, shade,
         triangles::{self, Records},
@@ -185,17 +186,23 @@ pub(crate) fn record(
     }
     let visible = Visible::find(graph, frame, info, frame.samples)?;
     let triangles = triangles::fill(graph, frame, info.id, &visible)?;
-    let source = format!("dais{}", visible.tag('-'));
+    let tag = visible.tag_after("");
     let surfaces = visible.surfaces();
-    let radiance = shade(graph, frame, info, rate, (&source, &surfaces), &triangles.records, &|pass| {
-        visible.bind(frame, pass);
-        triangles.bind(pass);
-    })?;
+    let radiance =
+        shade(graph, frame, info, rate, (source_of(frame, &tag), &surfaces), &triangles.records, &|pass| {
+            visible.bind(frame, pass);
+            triangles.bind(pass);
+        })?;
     drop(surfaces);
     if let Visible::Ids { depth, .. } = visible {
         frame.board.put(OpaqueDepth(depth));
     }
     Ok(radiance)
+}
+
+/// The source of surfaces of `source_dais.glsl` in the variants with a tag.
+fn source_of<'a>(frame: &Frame<'_>, tag: &'a str) -> SurfaceSource<'a> {
+    SurfaceSource { folder: "dais", tag, shading_tag: None, samples: frame.samples }
 }
 
 /// Declares the shading pass by the technique's parameters or, where the frame shows a view of `records`, its passes; `bind` binds
@@ -205,16 +212,15 @@ pub(crate) fn shade(
     frame: &Frame<'_>,
     info: &'static Info,
     rate: Option<&LowRate>,
-    (source, surfaces): (&str, &cells::VisibleDepths<'_>),
+    (source, surfaces): (SurfaceSource<'_>, &cells::VisibleDepths<'_>),
     records: &Records,
     bind: &dyn Fn(&mut dyn SourceSlots),
 ) -> Result<ImageHandle, TechniqueError> {
     if views::is_of_triangles(frame.view) {
-        let samples = frame.samples;
-        return RecordSource { technique: info.id, tag: source, samples, records, bind }.record(graph, frame);
+        return RecordSource { technique: info.id, source, records, bind }.record(graph, frame);
     }
-    let source = format!("{source}{}", rate.map_or("", LowRate::tag));
-    shade::shade(graph, frame, info, (&source, frame.samples), surfaces, &|pass| {
+    let source = SurfaceSource { shading_tag: rate.map(LowRate::tag), ..source };
+    shade::shade(graph, frame, info, source, surfaces, &|pass| {
         if let Some(rate) = rate {
             rate.constants(pass);
         }
@@ -294,8 +300,8 @@ fn record_cached(
 
     let triangles = list.derivatives(graph, frame, info.id)?;
     let visible = Visible::Ids { ids: references, depth, samples: frame.samples };
-    let source = format!("dais-{}{}", if wide { "wide" } else { "refs" }, visible.tag('-'));
-    shade(graph, frame, info, rate, (&source, &visible.surfaces()), &triangles, &|pass| {
+    let tag = visible.tag_after(if wide { "wide" } else { "refs" });
+    shade(graph, frame, info, rate, (source_of(frame, &tag), &visible.surfaces()), &triangles, &|pass| {
         visible.bind(frame, pass);
         triangles.bind(pass);
     })

@@ -20,6 +20,7 @@ use afterlight_shader::Shader;
 use afterlight_stages::{
     lights::{cells, step},
     surfaces::claims,
+    surfaces::shade::SurfaceSource,
     surfaces::{claims::NOT_TAKEN, depth_first::FIRST_FRAGMENT, triangles},
 };
 
@@ -97,13 +98,15 @@ impl Technique for DaisList {
         }
         frame.watch(graph, "nodes", &lists.node_count, lists.capacity, lists.bounded);
         let rate = LowRate::chosen(frame, &INFO)?;
-        let source = if frame.tessellate_px.is_some() { "dais-nodes-places" } else { "dais-nodes" };
+        let tag = if frame.tessellate_px.is_some() { "places" } else { "" };
+        let source = SurfaceSource { folder: "dais_list", tag, shading_tag: None, samples: frame.samples };
         let stored = triangles.store(graph, frame)?;
         let bind = |pass: &mut dyn SourceSlots| {
             lists.bind(pass);
             stored.bind(pass);
         };
-        let surfaces = cells::VisibleDepths::of_source(source, frame.samples, |pass| bind(pass));
+        let surfaces =
+            cells::VisibleDepths::of_source((source.folder, tag), frame.samples, |pass| bind(pass));
         dais::shade(graph, frame, &INFO, rate.as_ref(), (source, &surfaces), stored.records(), &bind)
     }
 }

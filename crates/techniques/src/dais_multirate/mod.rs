@@ -105,7 +105,7 @@ impl LowRate {
 
     /// Tag of the shading shader's variants.
     pub fn tag(&self) -> &'static str {
-        if self.quads { "-quads" } else { "-grid" }
+        if self.quads { "quads" } else { "grid" }
     }
 
     /// Sets the specialization constants of `low_rate.glsl`.

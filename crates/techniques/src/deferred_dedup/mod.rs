@@ -4,7 +4,7 @@
 
 pub mod cost;
 
-use afterlight_graph::{Graph, ImageHandle};
+use afterlight_graph::{BufferRole, Graph, ImageHandle, Load, PassRole, gpu::vk};
 
 use afterlight_cost::{Cost, Workload};
 use afterlight_frame::{
@@ -12,7 +12,16 @@ use afterlight_frame::{
     TechniqueError,
 };
 use afterlight_shader::Shader;
-use afterlight_stages::{lights::step, surfaces::shade};
+use afterlight_stages::{
+    lights::step,
+    surfaces::shade,
+    surfaces::{
+        geometry::SceneDraws,
+        samples::{self, SampleBuffer, SampleImage, emission_tag, emission_variant},
+        shade::SurfaceSource,
+        visible::NO_TRIANGLE_RGBA8,
+    },
+};
 
 /// The technique.
 pub static TECHNIQUE: DeferredDedup = DeferredDedup;
@@ -42,7 +51,7 @@ static INFO: Info = Info {
     },
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
     params: &[step::LIGHTS],
-    needs: &[shade::STANDARD_LOCATIONS],
+    needs: &[samples::STANDARD_LOCATIONS],
     samples: MULTIPLE_SAMPLES,
     tessellation: true,
     views: shade::VIEWS,
@@ -62,12 +71,55 @@ impl Technique for DeferredDedup {
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
-        let filled = shade::fill_dedup(graph, frame, "deferred-dedup")?;
+        let filled = fill(graph, frame)?;
         let surfaces = filled.surfaces(frame);
-        let source = ("dedup", frame.samples);
+        let source = SurfaceSource {
+            folder: "deferred_dedup",
+            tag: "",
+            shading_tag: emission_tag(frame),
+            samples: frame.samples,
+        };
         let radiance = shade::shade(graph, frame, &INFO, source, &surfaces, &|pass| filled.bind(pass))?;
         drop(surfaces);
         frame.board.put(OpaqueDepth(filled.depth));
         Ok(radiance)
     }
+}
+
+/// Declares the pass `deferred-dedup/gbuffer` that fills 20 bytes a sample, depth included: base colour and metalness, normal and roughness,
+/// triangle ID, view distance and occlusion (Schied and Dachsbacher 2015, section 5).
+///
+/// # Errors
+/// A shader that is not compiled in.
+fn fill(graph: &mut Graph, frame: &Frame<'_>) -> Result<SampleBuffer, TechniqueError> {
+    let numbered = frame.tessellate_px.is_some();
+    let [opaque, masked] = match numbered {
+        false => ["deferred_dedup/dedup.frag", "deferred_dedup/dedup.frag#mask"],
+        true => ["deferred_dedup/dedup.frag#numbered", "deferred_dedup/dedup.frag#mask-numbered"],
+    };
+    let mut surfaces =
+        SceneDraws::shaded(frame, &emission_variant(frame, opaque), &emission_variant(frame, masked))?;
+    let mut count = None;
+    if numbered {
+        surfaces = surfaces.numbered(frame, INFO.id)?;
+        let buffer = graph.buffer(&format!("{}/triangle numbers", INFO.id), BufferRole::Counters, 4);
+        count = Some(graph.clear_buffer(
+            &format!("{}/clear triangle numbers", INFO.id),
+            PassRole::Geometry,
+            buffer,
+            0,
+        ));
+    }
+    let images = [
+        SampleImage::attributes("gbuffer_base_color", vk::Format::R8G8B8A8_SRGB),
+        SampleImage::attributes("gbuffer_normal", vk::Format::R8G8B8A8_UNORM),
+        SampleImage {
+            slot: "ids",
+            role: BufferRole::Visibility,
+            format: vk::Format::R8G8B8A8_UNORM,
+            load: Load::Clear(NO_TRIANGLE_RGBA8),
+        },
+        SampleImage::attributes("gbuffer_distance", vk::Format::R8G8B8A8_UNORM),
+    ];
+    samples::fill(graph, frame, INFO.id, &surfaces, &images, count)
 }

@@ -17,7 +17,12 @@ use afterlight_frame::{
 use afterlight_shader::Shader;
 use afterlight_stages::{
     lights::step,
-    surfaces::shade::{self, SampleBuffer, emission_variant},
+    surfaces::samples::{SampleBuffer, emission_variant},
+    surfaces::shade,
+    surfaces::{
+        samples::{self, emission_tag},
+        shade::SurfaceSource,
+    },
 };
 
 /// The technique.
@@ -51,7 +56,7 @@ static INFO: Info = Info {
     },
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
     params: &[step::LIGHTS],
-    needs: &[shade::STANDARD_LOCATIONS],
+    needs: &[samples::STANDARD_LOCATIONS],
     samples: MULTIPLE_SAMPLES,
     tessellation: true,
     views: shade::VIEWS,
@@ -81,12 +86,17 @@ impl Technique for DeferredMsaa {
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
-        let filled = shade::fill_samples(graph, frame, "deferred-msaa")?;
+        let filled = samples::fill_samples(graph, frame, "deferred-msaa")?;
         let radiance = match step::chosen(frame, &INFO) {
             "all" => shade_by_stencil(graph, frame, &filled)?,
             _ => {
                 let surfaces = filled.surfaces(frame);
-                let source = ("msaa", frame.samples);
+                let source = SurfaceSource {
+                    folder: "deferred_msaa",
+                    tag: "",
+                    shading_tag: emission_tag(frame),
+                    samples: frame.samples,
+                };
                 shade::shade(graph, frame, &INFO, source, &surfaces, &|pass| filled.bind(pass))?
             }
         };
@@ -112,9 +122,9 @@ fn shade_by_stencil(
         frame.image_info(vk::Format::R16G16B16A16_SFLOAT),
     );
     let samples = [("SAMPLES", frame.samples)];
-    let mark = shade::full_screen(frame, "surfaces/shade/mark.frag", &samples)?.stencil(MARK);
+    let mark = shade::full_screen(frame, "surfaces/samples/mark.frag", &samples)?.stencil(MARK);
     let shaded = |rate: &str| {
-        let fragment = emission_variant(frame, &format!("surfaces/shade/shade.frag#{rate}"));
+        let fragment = emission_variant(frame, &format!("deferred_msaa/shade.frag#{rate}"));
         let state = shade::full_screen(frame, &fragment, &shade::shade_constants(frame, frame.samples))?;
         Ok::<_, TechniqueError>(state.stencil(MARKED).depth(DepthTest::OFF))
     };

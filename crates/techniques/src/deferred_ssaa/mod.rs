@@ -10,7 +10,14 @@ use afterlight_frame::{
     TechniqueError,
 };
 use afterlight_shader::Shader;
-use afterlight_stages::{lights::step, surfaces::shade};
+use afterlight_stages::{
+    lights::step,
+    surfaces::shade,
+    surfaces::{
+        samples::{self, emission_tag},
+        shade::SurfaceSource,
+    },
+};
 
 /// The technique.
 pub static TECHNIQUE: DeferredSsaa = DeferredSsaa;
@@ -43,7 +50,7 @@ static INFO: Info = Info {
     },
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
     params: &[step::LIGHTS],
-    needs: &[shade::STANDARD_LOCATIONS],
+    needs: &[samples::STANDARD_LOCATIONS],
     samples: MULTIPLE_SAMPLES,
     tessellation: true,
     views: shade::VIEWS,
@@ -63,9 +70,14 @@ impl Technique for DeferredSsaa {
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
-        let filled = shade::fill_samples(graph, frame, "deferred-ssaa")?;
+        let filled = samples::fill_samples(graph, frame, "deferred-ssaa")?;
         let surfaces = filled.surfaces(frame);
-        let source = ("ssaa", frame.samples);
+        let source = SurfaceSource {
+            folder: "deferred_ssaa",
+            tag: "",
+            shading_tag: emission_tag(frame),
+            samples: frame.samples,
+        };
         let radiance = shade::shade(graph, frame, &INFO, source, &surfaces, &|pass| filled.bind(pass))?;
         drop(surfaces);
         frame.board.put(OpaqueDepth(filled.depth));

@@ -21,6 +21,7 @@ use afterlight_stages::{
     lights::{cells, step},
     surfaces::claims::{NOT_TAKEN, claims},
     surfaces::{compute_raster, depth_first::FIRST_FRAGMENT, geometry::SceneDraws, shade, visible::Visible},
+    surfaces::{samples, shade::SurfaceSource},
 };
 
 /// The technique.
@@ -94,7 +95,7 @@ static INFO: Info = Info {
         filter::OBJECTS,
         filter::EDGE_THRESHOLD,
     ],
-    needs: &[shade::STANDARD_LOCATIONS],
+    needs: &[samples::STANDARD_LOCATIONS],
     samples: ANY_SAMPLES,
     tessellation: false,
     views: shade::VIEWS,
@@ -226,26 +227,33 @@ impl Technique for GbufferList {
             _ => fill_by_compute(graph, frame, &layout)?,
         };
         frame.watch(graph, "blocks", &lists.count, layout.capacity, layout.is_fixed);
-        let source = match &lists.samples {
-            Samples::Keys(_) => "list-keys",
-            Samples::Depth(_) if layout.samples == 1 => "list-one",
-            Samples::Depth(_) => "list",
+        let tag = match &lists.samples {
+            Samples::Keys(_) => "keys",
+            Samples::Depth(_) if layout.samples == 1 => "one",
+            Samples::Depth(_) => "",
         };
         let surfaces = match &lists.samples {
             Samples::Keys(keys) => cells::VisibleDepths::of_keys(keys, layout.samples),
             Samples::Depth(depth) => cells::VisibleDepths::of_depth(depth, layout.samples),
         };
-        let radiance = shade::shade(graph, frame, &INFO, (source, layout.samples), &surfaces, &|pass| {
-            for (name, value) in layout.constants() {
-                pass.constant(name, value);
-            }
-            pass.constant("KEEPS_ALL", u32::from(layout.keeps_all));
-            pass.read_buffer("Blocks", &lists.blocks);
-            match &lists.samples {
-                Samples::Depth(depth) => pass.read_image("gbuffer_depth", depth),
-                Samples::Keys(keys) => pass.read_buffer("SampleKeys", keys),
-            }
-        })?;
+        let radiance = shade::shade(
+            graph,
+            frame,
+            &INFO,
+            SurfaceSource { folder: "gbuffer_list", tag, shading_tag: None, samples: layout.samples },
+            &surfaces,
+            &|pass| {
+                for (name, value) in layout.constants() {
+                    pass.constant(name, value);
+                }
+                pass.constant("KEEPS_ALL", u32::from(layout.keeps_all));
+                pass.read_buffer("Blocks", &lists.blocks);
+                match &lists.samples {
+                    Samples::Depth(depth) => pass.read_image("gbuffer_depth", depth),
+                    Samples::Keys(keys) => pass.read_buffer("SampleKeys", keys),
+                }
+            },
+        )?;
         drop(surfaces);
         if let Samples::Depth(depth) = lists.samples {
             frame.board.put(OpaqueDepth(depth));

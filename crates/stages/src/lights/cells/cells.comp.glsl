@@ -5,7 +5,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "lights/cells/grid.glsl"
-#include "lights/cells/surfaces.glsl"
+#include "source"
 
 layout(local_size_x = 256) in;
 layout(set = 0, binding = 48, scalar) writeonly buffer Cells {

@@ -98,7 +98,9 @@ impl Division {
 
 /// Where view distances of what shows come from.
 pub struct VisibleDepths<'a> {
-    /// Tag of `clusters/cells.comp`.
+    /// Who lists the variants of templates for it: a technique's folder; none for those of the stages' own sources.
+    folder: Option<&'a str>,
+    /// Tag of the variants, with `#`; empty for the plain one.
     tag: String,
     /// Samples a pixel.
     samples: u32,
@@ -110,6 +112,7 @@ impl<'a> VisibleDepths<'a> {
     pub fn of_depth(depth: &'a ImageHandle, samples: u32) -> Self {
         let tag = if samples == 1 { "#one" } else { "" };
         Self {
+            folder: None,
             tag: tag.to_owned(),
             samples,
             bind: Box::new(move |pass| _ = pass.read("gbuffer_depth", depth)),
@@ -119,6 +122,7 @@ impl<'a> VisibleDepths<'a> {
     /// The keys of `compute_raster`.
     pub fn of_keys(keys: &'a BufferHandle, samples: u32) -> Self {
         Self {
+            folder: None,
             tag: "#keys".to_owned(),
             samples,
             bind: Box::new(move |pass| _ = pass.read("SampleKeys", keys)),
@@ -130,9 +134,9 @@ impl<'a> VisibleDepths<'a> {
         self.samples
     }
 
-    /// Tag of the variants of `clusters/cells.comp` and `light_lists/heads.comp` that read it.
-    pub fn tag(&self) -> &str {
-        &self.tag
+    /// Name of the variant of a template of a stage that reads it.
+    pub fn shader(&self, stage: &str, template: &str) -> String {
+        format!("{}/{template}{}", self.folder.unwrap_or(stage), self.tag)
     }
 
     /// Binds what a shader with `surfaces.glsl` reads.
@@ -143,9 +147,14 @@ impl<'a> VisibleDepths<'a> {
         (self.bind)(pass);
     }
 
-    /// What a variant `#tag` of `clusters/cells.comp` reads.
-    pub fn of_source(tag: &str, samples: u32, bind: impl Fn(&mut ComputePass<'_>) + 'a) -> Self {
-        Self { tag: format!("#{tag}"), samples, bind: Box::new(bind) }
+    /// What variants of templates read that a technique lists for a source of distances of its own.
+    pub fn of_source(
+        (folder, tag): (&'a str, &str),
+        samples: u32,
+        bind: impl Fn(&mut ComputePass<'_>) + 'a,
+    ) -> Self {
+        let separator = if tag.is_empty() { "" } else { "#" };
+        Self { folder: Some(folder), tag: format!("{separator}{tag}"), samples, bind: Box::new(bind) }
     }
 }
 
@@ -267,7 +276,7 @@ impl<'a> Stage<'a> {
             graph.buffer(&self.name("cells"), BufferRole::Lights, 16 * u64::from(self.cell_capacity.max(1)));
         let words = graph.buffer(&self.name("cell words"), BufferRole::Lights, 8 * self.words.max(1));
         let count = self.zeroed(graph, "cell count");
-        let shader = self.frame.shader(&format!("lights/cells/cells.comp{}", surfaces.tag))?;
+        let shader = self.frame.shader(&surfaces.shader("lights/cells", "cells.comp"))?;
         let mut pass = self.pass(graph, "cells", &shader);
         surfaces.bind(&shader, &mut pass);
         let cells = pass.write("Cells", cells);

@@ -4,7 +4,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "frame.glsl"
-#include "lights/cells/surfaces.glsl"
+#include "source"
 #include "lights/pixel_lists/head.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;

@@ -106,7 +106,7 @@ fn empty_heads(
     let bytes = 12 * u64::from(frame.width_px) * u64::from(frame.height_px);
     frame.check_binding(technique, "light heads", bytes)?;
     let heads = graph.buffer(&format!("{technique}/light heads"), BufferRole::Lights, bytes);
-    let shader = frame.shader(&format!("lights/pixel_lists/heads.comp{}", surfaces.tag()))?;
+    let shader = frame.shader(&surfaces.shader("lights/pixel_lists", "heads.comp"))?;
     let mut pass = frame.compute(graph, &format!("{technique}/heads"), PassRole::LightAssignment, &shader);
     surfaces.bind(&shader, &mut pass);
     let heads = pass.write("LightHeads", heads);

@@ -1,12 +1,7 @@
-//! Stages of techniques that shade several samples a pixel after rasterisation: two multisampled G-buffers, and the
-//! compute pass that shades what any source of surfaces holds of a pixel and averages it.
+//! Shades whatever a technique's source of surfaces holds of a pixel, by any light step, and averages it.
 //!
-//! | G-buffer | bytes a sample with depth | content |
-//! | --- | --- | --- |
-//! | [`fill_samples`] | 16 | base colour and metalness, normal, roughness, occlusion, an edge mark (Fridvalszky and Tóth 2020, section 3) |
-//! | [`fill_dedup`] | 20 | base colour and metalness, normal and roughness, triangle ID, view distance and occlusion (Schied and Dachsbacher 2015, section 5) |
-//!
-//! Scenes with emissive surfaces take four bytes more.
+//! A source is a GLSL header of the technique with the functions that `shade.glsl` names; the technique's `variants.txt` lists which variants
+//! of the templates `shade.comp`, `shade.frag` and `volume.frag` there are of it.
 
 use afterlight_graph::{BufferHandle, BufferRole, Graph, ImageHandle, Load, PassRole, RasterPass, gpu::vk};
 
@@ -16,151 +11,49 @@ use crate::{
 };
 use afterlight_frame::{Frame, Info, Need, Slots, SourceSlots, TechniqueError, views};
 
-/// Positions are reconstructed where the samples stand.
-pub const STANDARD_LOCATIONS: Need =
-    Need { name: "standard sample locations", test: |features| features.standard_sample_locations };
-
 /// Views of techniques that end in [`shade`].
 pub const VIEWS: &[&str] = &[views::SAMPLE_USAGE, views::INVOCATIONS, views::EDGES, views::WEIGHTS];
-
-/// A multisampled G-buffer: the depth, and other images with the names of their slots.
-pub struct SampleBuffer {
-    /// Depth, reversed.
-    pub depth: ImageHandle,
-    /// Other images by slot.
-    pub images: Vec<(&'static str, ImageHandle)>,
-}
-
-impl SampleBuffer {
-    /// Where its surfaces stand.
-    pub fn surfaces(&self, frame: &Frame<'_>) -> cells::VisibleDepths<'_> {
-        cells::VisibleDepths::of_depth(&self.depth, frame.samples)
-    }
-
-    /// Binds what a source of surfaces reads.
-    pub fn bind(&self, pass: &mut (impl Slots + ?Sized)) {
-        pass.read_image("gbuffer_depth", &self.depth);
-        for (slot, image) in &self.images {
-            pass.read_image(slot, image);
-        }
-    }
-}
-
-/// Name of a shader's variant for the scene: with emission where a surface emits.
-pub fn emission_variant(frame: &Frame<'_>, name: &str) -> String {
-    let tag = if name.contains('#') { "-emission" } else { "#emission" };
-    if frame.scene.has_emission { format!("{name}{tag}") } else { name.to_owned() }
-}
-
-/// Declares the pass `technique/gbuffer` that fills 16 bytes a sample, depth included.
-///
-/// # Errors
-/// A shader that is not compiled in.
-pub fn fill_samples(
-    graph: &mut Graph,
-    frame: &Frame<'_>,
-    technique: &str,
-) -> Result<SampleBuffer, TechniqueError> {
-    let surfaces = SceneDraws::new(
-        frame,
-        (
-            "surfaces/geometry/surface.vert#centroid",
-            Some(&emission_variant(frame, "surfaces/shade/samples.frag")),
-        ),
-        (
-            "surfaces/geometry/surface.vert#centroid",
-            &emission_variant(frame, "surfaces/shade/samples.frag#mask"),
-        ),
-    )?;
-    let images = [
-        ("gbuffer_base_color", vk::Format::R8G8B8A8_SRGB, Load::DontCare),
-        ("gbuffer_normal", vk::Format::R16G16_UNORM, Load::DontCare),
-        // Samples without a surface are no edge.
-        ("gbuffer_roughness", vk::Format::R8G8B8A8_UNORM, Load::Clear([0.0; 4])),
-    ];
-    fill(graph, frame, technique, &surfaces, &images, None)
-}
-
-/// Declares the pass `technique/gbuffer` that fills 20 bytes a sample, depth included.
-///
-/// # Errors
-/// A shader that is not compiled in.
-pub fn fill_dedup(
-    graph: &mut Graph,
-    frame: &Frame<'_>,
-    technique: &'static str,
-) -> Result<SampleBuffer, TechniqueError> {
-    let numbered = frame.tessellate_px.is_some();
-    let [opaque, masked] = match numbered {
-        false => ["surfaces/shade/dedup.frag", "surfaces/shade/dedup.frag#mask"],
-        true => ["surfaces/shade/dedup.frag#numbered", "surfaces/shade/dedup.frag#mask-numbered"],
-    };
-    let mut surfaces =
-        SceneDraws::shaded(frame, &emission_variant(frame, opaque), &emission_variant(frame, masked))?;
-    let mut count = None;
-    if numbered {
-        surfaces = surfaces.numbered(frame, technique)?;
-        let buffer = graph.buffer(&format!("{technique}/triangle numbers"), BufferRole::Counters, 4);
-        count = Some(graph.clear_buffer(
-            &format!("{technique}/clear triangle numbers"),
-            PassRole::Geometry,
-            buffer,
-            0,
-        ));
-    }
-    let images = [
-        ("gbuffer_base_color", vk::Format::R8G8B8A8_SRGB, Load::DontCare),
-        ("gbuffer_normal", vk::Format::R8G8B8A8_UNORM, Load::DontCare),
-        ("ids", vk::Format::R8G8B8A8_UNORM, Load::Clear(NO_TRIANGLE_RGBA8)),
-        ("gbuffer_distance", vk::Format::R8G8B8A8_UNORM, Load::DontCare),
-    ];
-    fill(graph, frame, technique, &surfaces, &images, count)
-}
-
-fn fill(
-    graph: &mut Graph,
-    frame: &Frame<'_>,
-    technique: &str,
-    surfaces: &SceneDraws,
-    images: &[(&'static str, vk::Format, Load<[f32; 4]>)],
-    triangle_count: Option<BufferHandle>,
-) -> Result<SampleBuffer, TechniqueError> {
-    let mut images = images.to_vec();
-    if frame.scene.has_emission {
-        images.push(("gbuffer_emission", vk::Format::B10G11R11_UFLOAT_PACK32, Load::DontCare));
-    }
-    let mut declared = Vec::new();
-    for (slot, format, load) in &images {
-        let name = format!("{technique}/{}", slot.trim_start_matches("gbuffer_").replace('_', " "));
-        let role = if *slot == "ids" { BufferRole::Visibility } else { BufferRole::Surfaces };
-        declared.push((*slot, graph.image(&name, role, frame.multisampled_info(*format)), *load));
-    }
-    let depth = graph.image(
-        &format!("{technique}/depth"),
-        BufferRole::Depth,
-        frame.multisampled_info(vk::Format::D32_SFLOAT),
-    );
-
-    let mut pass = graph.raster(&format!("{technique}/gbuffer"), PassRole::Geometry);
-    frame.bind_scene(&mut pass);
-    if let Some(count) = triangle_count {
-        let _count = pass.write("TriangleNumbers", count);
-    }
-    let images = declared.into_iter().map(|(slot, image, load)| (slot, pass.color(image, load))).collect();
-    let depth = pass.depth(depth, Load::Clear(0.0));
-    surfaces.draw(frame, &mut pass);
-    pass.finish();
-    Ok(SampleBuffer { depth, images })
-}
 
 /// Specialization constants of shaders that include `multisample/shade.glsl`.
 pub fn shade_constants(frame: &Frame<'_>, samples: u32) -> [(&'static str, u32); 2] {
     [("SAMPLES", samples), ("VIEW", views::number(frame.view))]
 }
 
-/// Declares the pass `technique/shade`: shades every surface that `source` (a tag of `multisample/shade.comp`) holds of a
-/// pixel of `samples` samples by the lights that its parameter `lights` lets them visit and averages them; `surfaces` are where they stand, `bind` binds what the
-/// source reads. Returns radiance, RGBA16F.
+/// A technique's own source of surfaces: the variants of templates that its `variants.txt` lists.
+#[derive(Clone, Copy)]
+pub struct SurfaceSource<'a> {
+    /// Folder of the technique that lists them.
+    pub folder: &'a str,
+    /// Tag of the variants; empty for the plain ones.
+    pub tag: &'a str,
+    /// What the variant of `shade.comp` has besides: emission, or how it shares indirect light.
+    pub shading_tag: Option<&'a str>,
+    /// Samples a pixel.
+    pub samples: u32,
+}
+
+impl SurfaceSource<'_> {
+    /// Name of its variant of a template: `dais/volume.frag#refs-one`.
+    pub fn shader(&self, template: &str) -> String {
+        named(self.folder, template, &[self.tag])
+    }
+
+    /// Name of its variant of `shade.comp`.
+    fn shading_shader(&self) -> String {
+        named(self.folder, "shade.comp", &[self.tag, self.shading_tag.unwrap_or("")])
+    }
+}
+
+/// Name of a variant; empty tags are none.
+fn named(folder: &str, template: &str, tags: &[&str]) -> String {
+    let tags: Vec<&str> = tags.iter().copied().filter(|tag| !tag.is_empty()).collect();
+    let separator = if tags.is_empty() { "" } else { "#" };
+    format!("{folder}/{template}{separator}{}", tags.join("-"))
+}
+
+/// Declares the pass `technique/shade`: shades every surface that `source` holds of a pixel by the lights that the technique's parameter
+/// `lights` lets them visit and averages them; `surfaces` are where they stand, `bind` binds what the source reads. Returns radiance,
+/// RGBA16F.
 ///
 /// # Errors
 /// As [`LightStep::build`].
@@ -168,19 +61,14 @@ pub fn shade(
     graph: &mut Graph,
     frame: &Frame<'_>,
     info: &Info,
-    (source, samples): (&str, u32),
+    source: SurfaceSource<'_>,
     surfaces: &cells::VisibleDepths<'_>,
     bind: &dyn Fn(&mut dyn SourceSlots),
 ) -> Result<ImageHandle, TechniqueError> {
     let technique = info.id;
+    let samples = source.samples;
     let step = LightStep::build(graph, frame, info, surfaces)?;
-    let name = format!("surfaces/shade/shade.comp#{source}");
-    // Lists hold emission in their blocks, a triangle buffer has no need to.
-    let shader = frame.shader(&if source.starts_with("list") || source.starts_with("dais") {
-        name
-    } else {
-        emission_variant(frame, &name)
-    })?;
+    let shader = frame.shader(&source.shading_shader())?;
     let radiance = graph.image(
         &format!("{technique}/radiance"),
         BufferRole::Targets,
@@ -200,9 +88,7 @@ pub fn shade(
     pass.finish();
     match step {
         LightStep::None => {
-            // Lights know nothing of what indirect light shares.
-            let source = source.trim_end_matches("-grid").trim_end_matches("-quads");
-            let fragment = format!("surfaces/shade/volume.frag#{source}");
+            let fragment = source.shader("volume.frag");
             add_volumes(graph, frame, (technique, &fragment), radiance, &|pass| {
                 pass.constant("SAMPLES", samples);
                 bind(pass);

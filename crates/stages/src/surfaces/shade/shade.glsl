@@ -1,24 +1,15 @@
-// Shades the surfaces of a pixel and averages them by their weights, whatever holds them: a SOURCE_* macro names it.
+// Shades the surfaces of a pixel and averages them by their weights, whatever holds them. A technique names the header that is included
+// as "source" in its variants.txt.
 //
-// A source has three parts: source_begin(pixel), source_next(surface, weight) until it is false, and source_background, the
-// samples without a surface. Weights are samples; they and the background sum to SAMPLES.
+// A source has three parts: source_begin(pixel); source_next(surface, weight), called until it is false; and source_background, the
+// number of samples without a surface. Weights are numbers of samples; they and the background sum to SAMPLES.
 #include "shading.glsl"
 #include "heat.glsl"
 #include "surfaces/visible/sample_depth.glsl"
 
-#if defined(SOURCE_DEDUP)
-#include "surfaces/shade/source_dedup.glsl"
-#elif defined(SOURCE_DAIS)
-#include "dais/source_dais.glsl"
-#elif defined(SOURCE_DAIS_LIST)
-#include "dais_list/source_dais_list.glsl"
-#elif defined(SOURCE_LIST)
-#include "gbuffer_list/source_list.glsl"
-#else
-#include "surfaces/shade/source_samples.glsl"
-#endif
+#include "source"
 
-// 0 the image, 1 sample-usage, 2 invocations, 3 edges, 4 weights (techniques/src/view/mod.rs).
+// 0 the image, 1 sample-usage, 2 invocations, 3 edges, 4 weights (views::number in crates/frame).
 layout(constant_id = 9) const uint VIEW = 0u;
 
 uint shaded_count;  // surfaces shaded

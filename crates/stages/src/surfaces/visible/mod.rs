@@ -90,6 +90,14 @@ impl Visible {
         }
     }
 
+    /// Tag of a variant that reads it, after another tag that may be empty: `refs-one`.
+    pub fn tag_after(&self, before: &str) -> String {
+        match before {
+            "" => self.tag('-').trim_start_matches('-').to_owned(),
+            _ => format!("{before}{}", self.tag('-')),
+        }
+    }
+
     /// Binds what shaders read of it. Slots that no shader of the pass has stay unused.
     pub fn bind(&self, frame: &Frame<'_>, pass: &mut (impl Slots + ?Sized)) {
         match self {

@@ -4,7 +4,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "frame.glsl"
 #include "surfaces/visible/samples.glsl"
-#include "surfaces/shade/edge_mark.glsl"
+#include "surfaces/samples/edge_mark.glsl"
 
 void main() {
     if (!is_edge(ivec2(gl_FragCoord.xy))) {

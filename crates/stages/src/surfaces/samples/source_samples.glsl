@@ -1,8 +1,8 @@
 // Surfaces of a pixel from the multisampled G-buffer that samples.frag.glsl fills.
 //
-// SOURCE_SSAA: every sample. SOURCE_MSAA: every sample where a triangle's edge crosses the pixel, else the first alone;
-// PIXEL_RATE and SAMPLE_RATE say which before.
-#include "surfaces/shade/edge_mark.glsl"
+// EVERY_SAMPLE: all samples. Otherwise all samples where a triangle's edge crosses the pixel, else the first alone; PIXEL_RATE and
+// SAMPLE_RATE say beforehand which of the two it is.
+#include "surfaces/samples/edge_mark.glsl"
 
 layout(set = 0, binding = 9) uniform texture2DMS gbuffer_base_color;
 layout(set = 0, binding = 10) uniform texture2DMS gbuffer_normal;
@@ -20,7 +20,7 @@ void source_begin(ivec2 pixel) {
     source_pixel = pixel;
     source_index = 0u;
     source_background = 0u;
-#if defined(SOURCE_SSAA) || defined(SAMPLE_RATE)
+#if defined(EVERY_SAMPLE) || defined(SAMPLE_RATE)
     bool sample_rate = true;
 #elif defined(PIXEL_RATE)
     bool sample_rate = false;
