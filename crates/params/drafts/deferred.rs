@@ -1,0 +1,23 @@
+//! Parameters of `deferred`.
+
+use afterlight_params::parameters;
+
+use super::clusters::CellParams;
+use super::light_step::{GbufferLightParams, LightStepParams};
+
+parameters! {
+    /// Parameters of `deferred`.
+    pub struct DeferredParams {
+        /// Which lights a surface visits.
+        ..lights: GbufferLightParams;
+        /// How cells divide the view.
+        ..cells: CellParams;
+    }
+}
+
+impl DeferredParams {
+    /// How surfaces find their lights.
+    pub fn light_step(&self) -> LightStepParams {
+        self.lights.with(self.cells)
+    }
+}

@@ -1,0 +1,23 @@
+//! Parameters of `deferred-dedup`.
+
+use afterlight_params::parameters;
+
+use super::clusters::CellParams;
+use super::light_step::{LightParams, LightStepParams};
+
+parameters! {
+    /// Parameters of `deferred-dedup`.
+    pub struct DeferredDedupParams {
+        /// Which lights a surface visits.
+        ..lights: LightParams;
+        /// How cells divide the view.
+        ..cells: CellParams;
+    }
+}
+
+impl DeferredDedupParams {
+    /// How surfaces find their lights.
+    pub fn light_step(&self) -> LightStepParams {
+        self.lights.with(self.cells)
+    }
+}

@@ -1,0 +1,4 @@
+//! Parameters of `forward`.
+
+/// It has none of its own.
+pub type ForwardParams = afterlight_params::NoParams;

@@ -1,0 +1,4 @@
+//! Parameters of `light-prepass`.
+
+/// It has none of its own.
+pub type LightPrepassParams = afterlight_params::NoParams;

@@ -1,0 +1,4 @@
+//! Parameters of `tiled-forward`.
+
+/// Those of tiles alone.
+pub type TiledForwardParams = super::clusters::TileParams;

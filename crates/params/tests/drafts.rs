@@ -1,0 +1,117 @@
+//! Parameters that moved from lists of constants into structs are told as before.
+
+#[allow(dead_code, reason = "what reads the fields is elsewhere")]
+#[path = "../drafts/mod.rs"]
+mod drafts;
+
+use afterlight_params::{AutoOr, NoParams, ParamSet as _, Words};
+use drafts::{
+    clusters::CellParams,
+    dais::{CacheParams, DaisParams, Fill},
+    dais_multirate::{Rate, RateParams},
+    deferred::DeferredParams,
+    draws::DrawParams,
+    gbuffer_list::{Filter, FilterParams, GbufferListParams},
+    light_step::Lights,
+};
+use serde_json::{Value, json};
+
+/// What `afterlight techniques --json` told of parameters when they were constants.
+fn before() -> serde_json::Map<String, Value> {
+    match serde_json::from_str(include_str!("parameters.json")).expect("JSON") {
+        Value::Object(techniques) => techniques,
+        other => panic!("expected an object, found {other}"),
+    }
+}
+
+#[test]
+fn lists_are_as_they_were() {
+    let before = before();
+    let now = drafts::techniques();
+    let ids: Vec<&str> = now.iter().map(|(id, _)| *id).collect();
+    assert_eq!(ids, before.keys().map(String::as_str).collect::<Vec<_>>());
+    for (id, params) in &now {
+        let list = serde_json::to_value(params.infos()).expect("a list");
+        // As text, so that the order of fields and the way that numbers are written count.
+        assert_eq!(list.to_string(), before[*id].to_string(), "{id}");
+    }
+}
+
+#[test]
+fn defaults_resolve_to_what_lists_say() {
+    let before = before();
+    for (id, params) in drafts::techniques() {
+        let list = before[id].as_array().expect("a list");
+        let expected: serde_json::Map<String, Value> = list
+            .iter()
+            .map(|info| (info["key"].as_str().expect("a text").to_owned(), info["default"].clone()))
+            .collect();
+        assert_eq!(json!(params), Value::Object(expected), "{id}");
+    }
+}
+
+#[test]
+fn every_default_and_end_of_a_range_is_taken() {
+    for (id, mut params) in drafts::techniques() {
+        let defaults = params.clone();
+        for info in params.infos() {
+            params.set(info.key, &info.default).unwrap_or_else(|e| panic!("{id}: {e}"));
+            assert_eq!(params, defaults, "{id} {}", info.key);
+            let info = serde_json::to_value(&info).expect("an object");
+            let ends = ["min", "max"].iter().filter_map(|end| info.get(end));
+            let texts: Vec<String> = ends.map(Value::to_string).collect();
+            let names = info.get("values").and_then(Value::as_array).into_iter().flatten();
+            let names = names.map(|name| name.as_str().expect("a text").to_owned());
+            for text in texts.into_iter().chain(names) {
+                let key = info["key"].as_str().expect("a text");
+                params.set(key, &text).unwrap_or_else(|e| panic!("{id}: {e}"));
+            }
+            params = defaults.clone();
+        }
+    }
+}
+
+#[test]
+fn what_is_read_has_types() {
+    let all = drafts::techniques();
+    let mut dais = all.iter().find(|(id, _)| *id == "dais").expect("dais").1.clone();
+    dais.set("fill", "cache").expect("a name");
+    dais.set("cache-buckets", "65536").expect("in range");
+    dais.set("order", "scene").expect("a name");
+    dais.set("tile-px", "32").expect("in range");
+    let typed = dais.typed::<DaisParams>();
+    assert_eq!((typed.fill.fill, typed.fill.cache.buckets), (Fill::Cache, 65536));
+    assert_eq!(typed.light_step().cells.tiles.tile_px, 32);
+    assert_eq!(dais.typed::<CacheParams>().buckets, 65536);
+    assert_eq!(dais.typed::<CellParams>().clusters.slices, 128);
+    assert_eq!(dais.typed::<DrawParams>().order, drafts::draws::DrawOrder::Scene);
+    dais.typed_mut::<DaisParams>().fill.fill = Fill::Resolve;
+    assert_eq!(dais.get("fill").as_deref(), Some("resolve"));
+    assert!(dais.find::<NoParams>().is_none());
+}
+
+#[test]
+fn shared_sets_have_defaults_of_their_own() {
+    let all = drafts::techniques();
+    let rate = |id: &str| {
+        all.iter().find(|one| one.0 == id).expect("a technique").1.typed::<RateParams>().rate.cell_px()
+    };
+    assert_eq!((rate("dais-list"), rate("dais-multirate")), (1, 2));
+    assert_eq!(RateParams::default().rate, Rate::Half);
+    assert_eq!(DeferredParams::default().light_step().lights, Lights::Volumes);
+    assert_eq!(DaisParams::default().light_step().lights, Lights::Auto);
+}
+
+#[test]
+fn filters_are_bits() {
+    let mut params = GbufferListParams::default();
+    params.set("filter", "edges+depth").expect("words");
+    params.set("blocks", "4294967295").expect("in range");
+    assert_eq!(params.filter.filters.bits(), 1 << 5 | 1 << 2);
+    assert_eq!(params.blocks, AutoOr::Fixed(u32::MAX));
+    assert_eq!(params.get("filter").as_deref(), Some("depth+edges"));
+    params.set("filter", "none").expect("no words");
+    assert_eq!(params.filter, FilterParams { filters: Words::NONE, ..FilterParams::default() });
+    assert!(params.set("filter", "none+edges").is_err());
+    assert_eq!([Filter::Edges].into_iter().collect::<Words<_>>().bits(), 1 << 5);
+}
