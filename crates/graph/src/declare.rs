@@ -9,6 +9,7 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use afterlight_gpu::{self as gpu, vk};
+use afterlight_roles::{BufferRole, PassRole, PassWork};
 use afterlight_shader::Shader;
 
 use crate::error::GraphError;
@@ -666,6 +667,7 @@ pub(crate) enum Import {
 #[derive(Clone)]
 pub(crate) struct ResourceNode {
     pub name: String,
+    pub role: BufferRole,
     pub kind: ResourceKind,
     pub import: Option<Import>,
     pub kept: bool,
@@ -819,9 +821,24 @@ pub(crate) enum PassKind {
     Transfer(TransferNode),
 }
 
+impl PassKind {
+    /// By what kind of commands the device does it.
+    pub(crate) fn work(&self) -> PassWork {
+        match self {
+            Self::Raster(_) => PassWork::Raster,
+            Self::Compute(_) => PassWork::Compute,
+            Self::Transfer(TransferNode::FillBuffer { .. } | TransferNode::ClearImage { .. }) => {
+                PassWork::Clear
+            }
+            Self::Transfer(_) => PassWork::Copy,
+        }
+    }
+}
+
 #[derive(Clone)]
 pub(crate) struct PassNode {
     pub name: String,
+    pub role: PassRole,
     pub kind: PassKind,
     pub slots: Vec<SlotNode>,
     pub texture_set: Option<gpu::DescriptorSet>,
@@ -853,7 +870,13 @@ impl Graph {
         }
     }
 
-    fn add(&mut self, name: &str, kind: ResourceKind, import: Option<Import>) -> ResourceId {
+    fn add(
+        &mut self,
+        name: &str,
+        role: BufferRole,
+        kind: ResourceKind,
+        import: Option<Import>,
+    ) -> ResourceId {
         let bad = match &kind {
             ResourceKind::Image(info) if info.width == 0 || info.height == 0 => {
                 Some(("extent", format!("{}x{}", info.width, info.height), "at least 1x1"))
@@ -877,32 +900,46 @@ impl Graph {
             self.errors.push(GraphError::DuplicateName { name: name.to_owned() });
         }
         let id = ResourceId(u32::try_from(self.resources.len()).unwrap_or(u32::MAX));
-        self.resources.push(ResourceNode { name: name.to_owned(), kind, import, kept: false, output: false });
+        self.resources.push(ResourceNode {
+            name: name.to_owned(),
+            role,
+            kind,
+            import,
+            kept: false,
+            output: false,
+        });
         id
     }
 
     /// Declares a transient image; its memory may be shared with resources that live at other times.
-    pub fn image(&mut self, name: &str, info: ImageInfo) -> ImageHandle {
-        let resource = self.add(name, ResourceKind::Image(info), None);
+    pub fn image(&mut self, name: &str, role: BufferRole, info: ImageInfo) -> ImageHandle {
+        let resource = self.add(name, role, ResourceKind::Image(info), None);
         ImageHandle { graph: self.id, resource, info }
     }
 
     /// Declares a transient buffer of `bytes` bytes; its memory may be shared with resources that live at other times.
-    pub fn buffer(&mut self, name: &str, bytes: u64) -> BufferHandle {
-        let resource = self.add(name, ResourceKind::Buffer { bytes }, None);
+    pub fn buffer(&mut self, name: &str, role: BufferRole, bytes: u64) -> BufferHandle {
+        let resource = self.add(name, role, ResourceKind::Buffer { bytes }, None);
         BufferHandle { graph: self.id, resource, bytes }
     }
 
     /// Brings in a buffer that lives outside the graph; passes that write it always run.
-    pub fn import_buffer(&mut self, name: &str, buffer: &gpu::Buffer) -> BufferHandle {
+    pub fn import_buffer(&mut self, name: &str, role: BufferRole, buffer: &gpu::Buffer) -> BufferHandle {
         let bytes = buffer.bytes();
-        let resource = self.add(name, ResourceKind::Buffer { bytes }, Some(Import::Buffer(buffer.clone())));
+        let resource =
+            self.add(name, role, ResourceKind::Buffer { bytes }, Some(Import::Buffer(buffer.clone())));
         BufferHandle { graph: self.id, resource, bytes }
     }
 
     /// Brings in an image that lives outside the graph and is in `layout` before each frame; the frame leaves it in that
     /// layout again (with `UNDEFINED` its contents are dropped before, and its layout after is that of its last use).
-    pub fn import_image(&mut self, name: &str, image: &gpu::Image, layout: vk::ImageLayout) -> ImageHandle {
+    pub fn import_image(
+        &mut self,
+        name: &str,
+        role: BufferRole,
+        image: &gpu::Image,
+        layout: vk::ImageLayout,
+    ) -> ImageHandle {
         let [width, height] = image.extent();
         let info = ImageInfo {
             format: image.format(),
@@ -913,7 +950,7 @@ impl Graph {
             samples: image.samples(),
         };
         let import = Import::Image { image: image.clone(), layout };
-        let resource = self.add(name, ResourceKind::Image(info), Some(import));
+        let resource = self.add(name, role, ResourceKind::Image(info), Some(import));
         ImageHandle { graph: self.id, resource, info }
     }
 
@@ -922,10 +959,11 @@ impl Graph {
     pub(crate) fn import_fake(
         &mut self,
         name: &str,
+        role: BufferRole,
         info: ImageInfo,
         layout: vk::ImageLayout,
     ) -> ImageHandle {
-        let resource = self.add(name, ResourceKind::Image(info), Some(Import::Fake { layout }));
+        let resource = self.add(name, role, ResourceKind::Image(info), Some(Import::Fake { layout }));
         ImageHandle { graph: self.id, resource, info }
     }
 
@@ -954,9 +992,10 @@ impl Graph {
         }
     }
 
-    fn pass(&mut self, name: &str, kind: PassKind) -> usize {
+    fn pass(&mut self, name: &str, role: PassRole, kind: PassKind) -> usize {
         self.passes.push(PassNode {
             name: name.to_owned(),
+            role,
             kind,
             slots: Vec::new(),
             texture_set: None,
@@ -966,24 +1005,24 @@ impl Graph {
     }
 
     /// Begins a raster pass.
-    pub fn raster(&mut self, name: &str) -> RasterPass<'_> {
-        let pass = self.pass(name, PassKind::Raster(RasterNode::default()));
+    pub fn raster(&mut self, name: &str, role: PassRole) -> RasterPass<'_> {
+        let pass = self.pass(name, role, PassKind::Raster(RasterNode::default()));
         RasterPass { graph: self, pass }
     }
 
     /// Begins a compute pass with one shader.
-    pub fn compute(&mut self, name: &str, shader: &Shader) -> ComputePass<'_> {
+    pub fn compute(&mut self, name: &str, role: PassRole, shader: &Shader) -> ComputePass<'_> {
         let node = ComputeNode {
             shader: shader.clone(),
             constants: Vec::new(),
             push: Vec::new(),
             dispatches: Vec::new(),
         };
-        let pass = self.pass(name, PassKind::Compute(Box::new(node)));
+        let pass = self.pass(name, role, PassKind::Compute(Box::new(node)));
         ComputePass { graph: self, pass }
     }
 
-    fn transfer(&mut self, name: &str, handles: &[&dyn HandleDyn], node: TransferNode) {
+    fn transfer(&mut self, name: &str, role: PassRole, handles: &[&dyn HandleDyn], node: TransferNode) {
         for handle in handles {
             let (graph, resource) = handle.parts_dyn();
             if graph != self.id {
@@ -992,43 +1031,68 @@ impl Graph {
                 return;
             }
         }
-        self.pass(name, PassKind::Transfer(node));
+        self.pass(name, role, PassKind::Transfer(node));
     }
 
     /// Fills a buffer with a 32-bit word; its size is rounded down to whole words.
-    pub fn clear_buffer(&mut self, name: &str, buffer: BufferHandle, value: u32) -> BufferHandle {
-        self.transfer(name, &[&buffer], TransferNode::FillBuffer { buffer: buffer.resource, value });
+    pub fn clear_buffer(
+        &mut self,
+        name: &str,
+        role: PassRole,
+        buffer: BufferHandle,
+        value: u32,
+    ) -> BufferHandle {
+        self.transfer(name, role, &[&buffer], TransferNode::FillBuffer { buffer: buffer.resource, value });
         buffer
     }
 
     /// Clears a colour image, every level and layer.
-    pub fn clear_image(&mut self, name: &str, image: ImageHandle, color: [f32; 4]) -> ImageHandle {
-        self.clear_image_range(name, image, Subresource::ALL, color)
+    pub fn clear_image(
+        &mut self,
+        name: &str,
+        role: PassRole,
+        image: ImageHandle,
+        color: [f32; 4],
+    ) -> ImageHandle {
+        self.clear_image_range(name, role, image, Subresource::ALL, color)
     }
 
     /// Clears levels and layers of a colour image.
     pub fn clear_image_range(
         &mut self,
         name: &str,
+        role: PassRole,
         image: ImageHandle,
         range: Subresource,
         color: [f32; 4],
     ) -> ImageHandle {
         let node = TransferNode::ClearImage { image: image.resource, color, range };
-        self.transfer(name, &[&image], node);
+        self.transfer(name, role, &[&image], node);
         image
     }
 
     /// Copies the start of one buffer to the start of another: as many bytes as both have.
-    pub fn copy_buffer(&mut self, name: &str, src: &BufferHandle, dst: BufferHandle) -> BufferHandle {
+    pub fn copy_buffer(
+        &mut self,
+        name: &str,
+        role: PassRole,
+        src: &BufferHandle,
+        dst: BufferHandle,
+    ) -> BufferHandle {
         let bytes = src.bytes.min(dst.bytes);
         let node = TransferNode::CopyBuffer { src: src.resource, dst: dst.resource, bytes };
-        self.transfer(name, &[src, &dst], node);
+        self.transfer(name, role, &[src, &dst], node);
         dst
     }
 
     /// Copies an image to one of the same extents and a compatible format.
-    pub fn copy_image(&mut self, name: &str, src: &ImageHandle, dst: ImageHandle) -> ImageHandle {
+    pub fn copy_image(
+        &mut self,
+        name: &str,
+        role: PassRole,
+        src: &ImageHandle,
+        dst: ImageHandle,
+    ) -> ImageHandle {
         let same = |a: ImageInfo, b: ImageInfo| {
             (a.width, a.height, a.layers, a.mips, a.samples)
                 == (b.width, b.height, b.layers, b.mips, b.samples)
@@ -1042,7 +1106,7 @@ impl Graph {
             });
         }
         let node = TransferNode::CopyImage { src: src.resource, dst: dst.resource };
-        self.transfer(name, &[src, &dst], node);
+        self.transfer(name, role, &[src, &dst], node);
         dst
     }
 
@@ -1050,12 +1114,13 @@ impl Graph {
     pub fn copy_image_to_buffer(
         &mut self,
         name: &str,
+        role: PassRole,
         src: &ImageHandle,
         range: Subresource,
         dst: BufferHandle,
     ) -> BufferHandle {
         let node = TransferNode::CopyImageToBuffer { src: src.resource, range, dst: dst.resource };
-        self.transfer(name, &[src, &dst], node);
+        self.transfer(name, role, &[src, &dst], node);
         dst
     }
 }

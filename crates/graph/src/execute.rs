@@ -8,6 +8,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 use afterlight_gpu::{self as gpu, Device, GpuError, vk};
+use afterlight_roles::{PassRole, PassWork};
 use afterlight_shader::{BindingKind, Shader, Stage};
 
 use crate::bind::{self, BoundSlot, TEXTURE_SET};
@@ -17,9 +18,7 @@ use crate::declare::{
     StencilTest, Subresource, TransferNode,
 };
 use crate::error::GraphError;
-use crate::plan::{
-    Barrier, MemoryNeed, Placement, Plan, PlannedPass, Requirements, aspects, is_shared, mip_extent,
-};
+use crate::plan::{Barrier, MemoryNeed, Placement, Plan, PlannedPass, Requirements, aspects, mip_extent};
 use crate::report::{FrameReport, PassReport, ResourceReport};
 
 impl Requirements for Device {
@@ -231,6 +230,8 @@ enum Body {
 
 struct BoundPass {
     name: String,
+    role: PassRole,
+    work: PassWork,
     barriers: BarrierList,
     body: Body,
 }
@@ -262,6 +263,7 @@ impl Executor {
             .filter(|resource| resource.placement.is_some())
             .map(|resource| ResourceReport {
                 name: resource.name.clone(),
+                role: resource.role,
                 bytes: resource.need.bytes,
                 shared: resource.shared(),
                 output: resource.output,
@@ -307,9 +309,11 @@ impl Executor {
             .enumerate()
             .map(|(index, pass)| PassReport {
                 name: pass.name.clone(),
+                role: pass.role,
+                work: pass.work,
                 time_ns: completed.elapsed_ns(times[index], times[index + 1]),
                 statistics: completed.statistics(statistics[index]),
-                shared: is_shared(&pass.name),
+                shared: pass.role.is_shared(),
             })
             .collect();
         let last = times[self.passes.len()];
@@ -659,6 +663,8 @@ impl Builder<'_> {
                 .collect();
             passes.push(BoundPass {
                 name: pass.name.clone(),
+                role: pass.role,
+                work: pass.work,
                 barriers: self.barriers(&pass.barriers),
                 body: self.body(pass, &made, &pipeline_of[index])?,
             });

@@ -15,6 +15,7 @@ mod report;
 mod tests;
 
 pub use afterlight_gpu as gpu;
+pub use afterlight_roles::{BufferRole, PassRole, PassWork};
 
 pub use declare::{
     Blend, BlendEquation, BufferHandle, ComputePass, ConstantBits, DepthTest, Draw, DrawCall, Graph, Handle,

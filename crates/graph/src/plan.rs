@@ -8,6 +8,7 @@
 use std::collections::BTreeMap;
 
 use afterlight_gpu::{GpuError, vk};
+use afterlight_roles::{BufferRole, PassRole, PassWork};
 use afterlight_shader::{BindingKind, Shader, Stage};
 
 use crate::bind::{self, BoundSlot};
@@ -104,6 +105,10 @@ pub struct Access {
 pub struct PlannedPass {
     /// The pass's name.
     pub name: String,
+    /// What it is for.
+    pub role: PassRole,
+    /// By what kind of commands the device does it.
+    pub work: PassWork,
     /// Barriers before the pass.
     pub barriers: Vec<Barrier>,
     /// What the pass uses.
@@ -127,6 +132,8 @@ pub struct Placement {
 pub struct Traffic<'a> {
     /// The resource's name.
     pub name: &'a str,
+    /// What it holds.
+    pub role: BufferRole,
     /// Bytes by the device's memory requirements, of the whole resource.
     pub bytes: u64,
     /// Whether the pass reads what stood there before it.
@@ -140,6 +147,8 @@ pub struct Traffic<'a> {
 pub struct PlannedResource {
     /// The resource's name.
     pub name: String,
+    /// What it holds.
+    pub role: BufferRole,
     /// What it needs of memory; zero bytes for imported and unused resources.
     pub need: MemoryNeed,
     /// First and last pass (indices into [`Plan::passes`]) that use it; kept resources last to the end. `None` is unused.
@@ -165,13 +174,8 @@ pub struct PlannedResource {
 impl PlannedResource {
     /// Returns whether it belongs to work that techniques share.
     pub fn shared(&self) -> bool {
-        is_shared(&self.name)
+        self.role.is_shared()
     }
-}
-
-/// Returns whether a pass or a resource of that name is work that techniques share.
-pub(crate) fn is_shared(name: &str) -> bool {
-    name.starts_with("shared/")
 }
 
 /// Memory that transient resources share.
@@ -219,8 +223,8 @@ impl Plan {
                 continue;
             }
             let index = traffic.iter().position(|one| one.name == resource.name).unwrap_or_else(|| {
-                let (name, bytes) = (resource.name.as_str(), resource.need.bytes);
-                traffic.push(Traffic { name, bytes, read: false, written: false });
+                let (name, role, bytes) = (resource.name.as_str(), resource.role, resource.need.bytes);
+                traffic.push(Traffic { name, role, bytes, read: false, written: false });
                 traffic.len() - 1
             });
             let reads = !access.discard && access.access.as_raw() & !WRITES.as_raw() != 0;
@@ -236,7 +240,7 @@ impl Plan {
     }
 
     /// Bytes of everything that the technique allocates: without imported resources, the final colour target, and
-    /// resources named `shared/…`. Aliased resources count in full.
+    /// resources whose role is shared work. Aliased resources count in full.
     pub fn technique_bytes(&self) -> u64 {
         self.resources
             .iter()
@@ -1536,6 +1540,8 @@ impl Graph {
             plan.unused_slots.extend(resolved.unused);
             plan.passes.push(PlannedPass {
                 name: node.name.clone(),
+                role: node.role,
+                work: node.kind.work(),
                 barriers: barriers.next().unwrap_or_default(),
                 accesses: resolved.accesses,
                 node,
@@ -1602,6 +1608,7 @@ fn planned_resources(
         };
         out.push(PlannedResource {
             name: node.name.clone(),
+            role: node.role,
             need,
             lifetime: lifetimes[index],
             placement: None,

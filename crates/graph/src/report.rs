@@ -1,18 +1,23 @@
 //! What a run of a frame took: times, counts and bytes.
 
 pub use afterlight_gpu::Statistics;
+use afterlight_roles::{BufferRole, PassRole, PassWork};
 
 /// What one pass took.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PassReport {
     /// The pass's name.
     pub name: String,
+    /// What it is for.
+    pub role: PassRole,
+    /// By what kind of commands the device does it.
+    pub work: PassWork,
     /// Device time in nanoseconds from the end of the pass before to the end of this one, barriers included: the passes'
     /// times add up to the frame's. `None` where the device has no timestamps.
     pub time_ns: Option<f64>,
     /// What the pipeline counted. `None` where the device has no statistics queries.
     pub statistics: Option<Statistics>,
-    /// Whether it is work that techniques share (named `shared/…`), reported apart.
+    /// Whether it is work that techniques share by its role, reported apart.
     pub shared: bool,
 }
 
@@ -21,9 +26,11 @@ pub struct PassReport {
 pub struct ResourceReport {
     /// The resource's name.
     pub name: String,
+    /// What it holds.
+    pub role: BufferRole,
     /// Bytes by the device's memory requirements.
     pub bytes: u64,
-    /// Whether it belongs to work that techniques share (named `shared/…`).
+    /// Whether it belongs to work that techniques share by its role.
     pub shared: bool,
     /// Whether it is the final colour target, which the technique's bytes leave out.
     pub output: bool,

@@ -6,8 +6,8 @@ use afterlight_gpu::{
     Buffer, BufferDesc, Device, DeviceOptions, GpuError, ImageDesc, MemoryKind, SamplerDesc, vk,
 };
 use afterlight_graph::{
-    Blend, DepthTest, Draw, DrawCall, Executor, Graph, GraphError, ImageHandle, ImageInfo, Load, RasterState,
-    StencilFace, StencilTest, Subresource,
+    Blend, BufferRole, DepthTest, Draw, DrawCall, Executor, Graph, GraphError, ImageHandle, ImageInfo, Load,
+    PassRole, RasterState, StencilFace, StencilTest, Subresource,
 };
 use afterlight_shader::Shader;
 use afterlight_shader::compile::Compiler;
@@ -62,26 +62,28 @@ fn expected_pixel(x: u32, y: u32, shift: u32) -> [u8; 4] {
 /// Clear, compute, compute, raster and copies, twice over, with memory that is shared along the way.
 fn chain(g: &mut Graph, name: &str, shift: u32) -> ImageHandle {
     let pixels = u64::from(WIDTH * HEIGHT);
-    let values = g.buffer(&format!("{name}/values"), pixels * 4);
-    let values = g.clear_buffer(&format!("{name}/clear"), values, 7);
-    let mut pass = g.compute(&format!("{name}/pattern"), &shader("pattern.comp"));
+    let values = g.buffer(&format!("{name}/values"), BufferRole::Lights, pixels * 4);
+    let values = g.clear_buffer(&format!("{name}/clear"), PassRole::Upkeep, values, 7);
+    let mut pass = g.compute(&format!("{name}/pattern"), PassRole::LightAssignment, &shader("pattern.comp"));
     let values = pass.constant("SHIFT", shift).push(&[WIDTH, HEIGHT]).write("Values", values);
     pass.dispatch(groups(WIDTH, HEIGHT));
-    let copied = g.buffer(&format!("{name}/copied"), pixels * 4);
-    let copied = g.copy_buffer(&format!("{name}/copy"), &values, copied);
-    let painted = g.image(&format!("{name}/painted"), ImageInfo::new(COLOR, WIDTH, HEIGHT));
-    let mut pass = g.compute(&format!("{name}/paint"), &shader("paint.comp"));
+    let copied = g.buffer(&format!("{name}/copied"), BufferRole::Lights, pixels * 4);
+    let copied = g.copy_buffer(&format!("{name}/copy"), PassRole::Upkeep, &values, copied);
+    let painted =
+        g.image(&format!("{name}/painted"), BufferRole::Targets, ImageInfo::new(COLOR, WIDTH, HEIGHT));
+    let mut pass = g.compute(&format!("{name}/paint"), PassRole::LightAssignment, &shader("paint.comp"));
     pass.read("Values", &copied);
     let painted = pass.write("painted", painted);
     pass.dispatch(groups(WIDTH, HEIGHT));
-    let target = g.image(&format!("{name}/target"), ImageInfo::new(COLOR, WIDTH, HEIGHT));
-    let mut pass = g.raster(&format!("{name}/show"));
+    let target =
+        g.image(&format!("{name}/target"), BufferRole::Targets, ImageInfo::new(COLOR, WIDTH, HEIGHT));
+    let mut pass = g.raster(&format!("{name}/show"), PassRole::Shading);
     pass.read_sampled("source", &painted, SamplerDesc::NEAREST);
     let target = pass.color(target, Load::DontCare);
     let state = RasterState::new(&shader("triangle.vert"), Some(&shader("copy.frag")));
     pass.draw(covering(0.0, state));
-    let last = g.image(&format!("{name}/last"), ImageInfo::new(COLOR, WIDTH, HEIGHT));
-    g.copy_image(&format!("{name}/copy image"), &target, last)
+    let last = g.image(&format!("{name}/last"), BufferRole::Targets, ImageInfo::new(COLOR, WIDTH, HEIGHT));
+    g.copy_image(&format!("{name}/copy image"), PassRole::Upkeep, &target, last)
 }
 
 #[test]
@@ -141,15 +143,15 @@ fn depth_is_sampled_while_the_stencil_counts() {
     let Some(device) = open() else { return };
     let format = device.depth_stencil_format();
     let mut g = Graph::new();
-    let depth = g.image("depth", ImageInfo::new(format, WIDTH, HEIGHT));
-    let color = g.image("color", ImageInfo::new(COLOR, WIDTH, HEIGHT));
+    let depth = g.image("depth", BufferRole::Depth, ImageInfo::new(format, WIDTH, HEIGHT));
+    let color = g.image("color", BufferRole::Targets, ImageInfo::new(COLOR, WIDTH, HEIGHT));
     let (triangle, half) = (shader("triangle.vert"), shader("half.vert"));
     let strip = |state: RasterState, depth_ndc: f32| {
         Draw::new(state.topology(vk::PrimitiveTopology::TRIANGLE_STRIP), DrawCall::vertices(4))
             .push(&depth_ndc)
     };
 
-    let mut pass = g.raster("prepass");
+    let mut pass = g.raster("prepass", PassRole::DepthPrepass);
     let depth = pass.depth(depth, Load::Clear(0.0));
     pass.stencil_clear(1);
     pass.draw(covering(0.25, RasterState::new(&triangle, None).depth(DepthTest::NEAREST)));
@@ -164,7 +166,7 @@ fn depth_is_sampled_while_the_stencil_counts() {
     };
     let equal = StencilFace { compare: vk::CompareOp::EQUAL, ..StencilFace::KEEP };
     let masked = StencilTest { front: equal, back: equal, compare_mask: 0xff, write_mask: 0 };
-    let mut pass = g.raster("light");
+    let mut pass = g.raster("light", PassRole::Shading);
     pass.read("depth_map", &depth);
     let color = pass.color(color, Load::Clear([0.0; 4]));
     let depth = pass.stencil(depth, Load::Keep);
@@ -179,7 +181,7 @@ fn depth_is_sampled_while_the_stencil_counts() {
     pass.draw(covering(0.0, show.clone()).stencil_reference(9));
 
     // Depth tested and sampled at once, neither written.
-    let mut pass = g.raster("equal");
+    let mut pass = g.raster("equal", PassRole::Shading);
     pass.read("depth_map", &depth).depth_read_only(&depth);
     let color = pass.color(color, Load::Keep);
     let state =
@@ -214,19 +216,19 @@ fn a_mip_pyramid_reads_one_level_and_writes_the_next() {
     let Some(device) = open() else { return };
     let mut g = Graph::new();
     let format = vk::Format::R32_SFLOAT;
-    let pyramid = g.image("pyramid", ImageInfo::new(format, 32, 16).mips(5));
-    let mut pass = g.compute("ramp", &shader("ramp.comp"));
+    let pyramid = g.image("pyramid", BufferRole::Targets, ImageInfo::new(format, 32, 16).mips(5));
+    let mut pass = g.compute("ramp", PassRole::LightAssignment, &shader("ramp.comp"));
     let mut pyramid = pass.write_range("ramp", pyramid, Subresource::mip(0));
     pass.dispatch(groups(32, 16));
     let down = shader("down.comp");
     for mip in 1..5 {
-        let mut pass = g.compute(&format!("down {mip}"), &down);
+        let mut pass = g.compute(&format!("down {mip}"), PassRole::LightAssignment, &down);
         pass.read_range("finer", &pyramid, Subresource::mip(mip - 1));
         pyramid = pass.write_range("coarser", pyramid, Subresource::mip(mip));
         pass.dispatch(groups(32 >> mip, 16 >> mip));
     }
-    let out = g.buffer("out", 8);
-    let out = g.copy_image_to_buffer("last level", &pyramid, Subresource::mip(4), out);
+    let out = g.buffer("out", BufferRole::Lights, 8);
+    let out = g.copy_image_to_buffer("last level", PassRole::Upkeep, &pyramid, Subresource::mip(4), out);
     g.keep(&out);
     let plan = g.plan(&device).expect("a valid frame");
     let mut executor = Executor::new(&device, plan).expect("an executor");
@@ -241,20 +243,21 @@ fn a_mip_pyramid_reads_one_level_and_writes_the_next() {
 fn arguments_made_on_the_device_draw_and_dispatch() {
     let Some(device) = open() else { return };
     let mut g = Graph::new();
-    let (arguments, indices) = (g.buffer("arguments", 36), g.buffer("indices", 12));
-    let mut pass = g.compute("arguments", &shader("arguments.comp"));
+    let (arguments, indices) =
+        (g.buffer("arguments", BufferRole::Lights, 36), g.buffer("indices", BufferRole::Lights, 12));
+    let mut pass = g.compute("arguments", PassRole::LightAssignment, &shader("arguments.comp"));
     let arguments = pass.write("Arguments", arguments);
     let indices = pass.write("Indices", indices);
     pass.dispatch([1; 3]);
-    let color = g.image("color", ImageInfo::new(COLOR, WIDTH, HEIGHT));
+    let color = g.image("color", BufferRole::Targets, ImageInfo::new(COLOR, WIDTH, HEIGHT));
     let state = RasterState::new(&shader("triangle.vert"), Some(&shader("white.frag")));
-    let mut pass = g.raster("indirect");
+    let mut pass = g.raster("indirect", PassRole::Shading);
     let color = pass.color(color, Load::Clear([0.0; 4]));
     let call = DrawCall::IndexedIndirect { buffer: &arguments, offset: 0, count: 1, stride: 20 };
     pass.draw(Draw::new(state, call).push(&0.0f32).index_buffer(&indices, vk::IndexType::UINT32));
-    let counter = g.buffer("counter", 4);
-    let counter = g.clear_buffer("clear", counter, 0);
-    let mut pass = g.compute("count", &shader("count.comp"));
+    let counter = g.buffer("counter", BufferRole::Counters, 4);
+    let counter = g.clear_buffer("clear", PassRole::Upkeep, counter, 0);
+    let mut pass = g.compute("count", PassRole::LightAssignment, &shader("count.comp"));
     let counter = pass.write("Counter", counter);
     pass.dispatch_indirect(&arguments, 20).dispatch([1; 3]);
     g.keep(&counter);
@@ -280,10 +283,10 @@ fn a_tessellated_triangle_is_counted() {
         return;
     }
     let mut g = Graph::new();
-    let count = g.buffer("count", 4);
-    let count = g.clear_buffer("clear", count, 0);
-    let color = g.image("color", ImageInfo::new(COLOR, WIDTH, HEIGHT));
-    let mut pass = g.raster("patches");
+    let count = g.buffer("count", BufferRole::Counters, 4);
+    let count = g.clear_buffer("clear", PassRole::Upkeep, count, 0);
+    let color = g.image("color", BufferRole::Targets, ImageInfo::new(COLOR, WIDTH, HEIGHT));
+    let mut pass = g.raster("patches", PassRole::Shading);
     let count = pass.write("Count", count);
     let color = pass.color(color, Load::Clear([1.0; 4]));
     let state = RasterState::new(&shader("patch.vert"), Some(&shader("primitive.frag")))
@@ -320,9 +323,9 @@ fn four_samples_are_resolved() {
         return;
     }
     let mut g = Graph::new();
-    let many = g.image("many", ImageInfo::new(COLOR, WIDTH, HEIGHT).samples(4));
-    let one = g.image("one", ImageInfo::new(COLOR, WIDTH, HEIGHT));
-    let mut pass = g.raster("edge");
+    let many = g.image("many", BufferRole::Targets, ImageInfo::new(COLOR, WIDTH, HEIGHT).samples(4));
+    let one = g.image("one", BufferRole::Targets, ImageInfo::new(COLOR, WIDTH, HEIGHT));
+    let mut pass = g.raster("edge", PassRole::Shading);
     let _ = pass.color(many, Load::Clear([0.0; 4]));
     let one = pass.resolve(one);
     let state = RasterState::new(&shader("half.vert"), Some(&shader("white.frag")))
@@ -361,12 +364,12 @@ fn resources_from_outside_keep_their_contents_and_layout() {
     let count = shader("count.comp");
     let declare = || {
         let mut g = Graph::new();
-        let buffer = g.import_buffer("counter", &counter);
-        let mut pass = g.compute("count", &count);
+        let buffer = g.import_buffer("counter", BufferRole::Counters, &counter);
+        let mut pass = g.compute("count", PassRole::LightAssignment, &count);
         let _ = pass.write("Counter", buffer);
         pass.dispatch([1; 3]);
-        let image = g.import_image("image", &image, vk::ImageLayout::UNDEFINED);
-        let _ = g.clear_image("clear", image, [1.0, 0.0, 0.0, 1.0]);
+        let image = g.import_image("image", BufferRole::Targets, &image, vk::ImageLayout::UNDEFINED);
+        let _ = g.clear_image("clear", PassRole::Upkeep, image, [1.0, 0.0, 0.0, 1.0]);
         g
     };
     let plan = declare().plan(&device).expect("a valid frame");
@@ -381,8 +384,8 @@ fn resources_from_outside_keep_their_contents_and_layout() {
 
     // A pass needs a usage that the image was not made with.
     let mut g = Graph::new();
-    let handle = g.import_image("image", &image, vk::ImageLayout::UNDEFINED);
-    let _ = g.raster("draw").color(handle, Load::Clear([0.0; 4]));
+    let handle = g.import_image("image", BufferRole::Targets, &image, vk::ImageLayout::UNDEFINED);
+    let _ = g.raster("draw", PassRole::Shading).color(handle, Load::Clear([0.0; 4]));
     let plan = g.plan(&device).expect("a valid frame");
     let error = Executor::new(&device, plan).err().expect("an error").to_string();
     assert!(error.contains("\"image\"") && error.contains("COLOR_ATTACHMENT"), "{error}");

@@ -277,6 +277,8 @@ fn passes(reports: &[FrameReport], plan: &Plan) -> Vec<Pass> {
             let (reads, writes) = plan.passes.get(index).map(|pass| traffic(plan, pass)).unwrap_or_default();
             Pass {
                 name: pass.name.clone(),
+                role: Some(pass.role),
+                work: Some(pass.work),
                 ms: spread_ns(reports, |report| report.passes.get(index)?.time_ns),
                 reads,
                 writes,
@@ -291,7 +293,9 @@ fn traffic(plan: &Plan, pass: &PlannedPass) -> (Vec<Buffer>, Vec<Buffer>) {
     let traffic = plan.traffic(pass);
     let of = |counts: fn(&Traffic<'_>) -> bool| {
         let counted = traffic.iter().filter(|one| counts(one));
-        counted.map(|one| Buffer { name: one.name.to_owned(), bytes: one.bytes }).collect()
+        counted
+            .map(|one| Buffer { name: one.name.to_owned(), role: Some(one.role), bytes: one.bytes })
+            .collect()
     };
     (of(|one| one.read), of(|one| one.written))
 }
@@ -319,7 +323,7 @@ fn memory(report: &FrameReport) -> Memory {
             .memory
             .iter()
             .filter(|one| !one.shared && !one.output)
-            .map(|one| Buffer { name: one.name.clone(), bytes: one.bytes })
+            .map(|one| Buffer { name: one.name.clone(), role: Some(one.role), bytes: one.bytes })
             .collect(),
     }
 }

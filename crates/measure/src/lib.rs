@@ -12,3 +12,5 @@ pub use record::{
     Run, RunResult, SCHEMA, SceneRecord, SettingsRecord, Status,
 };
 pub use stats::Spread;
+
+pub use afterlight_roles::{BufferRole, PassRole, PassWork};

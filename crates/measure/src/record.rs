@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use afterlight_roles::{BufferRole, PassRole, PassWork};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -188,6 +189,12 @@ impl RunResult {
 pub struct Pass {
     /// `technique/stage`, or `shared/stage` for work that is not the technique's own.
     pub name: String,
+    /// What it is for; none in records from before there were roles.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub role: Option<PassRole>,
+    /// By what kind of commands the device does it; none in records from before there were roles.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub work: Option<PassWork>,
     /// GPU time, ms.
     pub ms: Option<Spread>,
     /// What it reads of the buffers and images that the frame allocates, scene data left out. Bytes are of the whole resource.
@@ -217,6 +224,9 @@ pub struct Memory {
 pub struct Buffer {
     /// Its name.
     pub name: String,
+    /// What it holds; none in records from before there were roles.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub role: Option<BufferRole>,
     /// Its size, bytes.
     pub bytes: u64,
 }
@@ -262,15 +272,17 @@ mod tests {
         result.frame_ms = Spread::of(&[1.0, 2.0, 4.0]);
         result.passes = vec![Pass {
             name: "tiled/shade".into(),
+            role: Some(PassRole::Shading),
+            work: Some(PassWork::Compute),
             ms: Spread::of(&[1.0]),
-            reads: vec![Buffer { name: "tiled/list".into(), bytes: 10 }],
+            reads: vec![Buffer { name: "tiled/list".into(), role: Some(BufferRole::Lights), bytes: 10 }],
             writes: Vec::new(),
             statistics: BTreeMap::from([("fragment_invocations".into(), 7)]),
         }];
         result.memory = Some(Memory {
             technique_bytes: 10,
             peak_bytes: 20,
-            buffers: vec![Buffer { name: "tiled/list".into(), bytes: 10 }],
+            buffers: vec![Buffer { name: "tiled/list".into(), role: Some(BufferRole::Lights), bytes: 10 }],
         });
         result.cost = Some(CostRecord { cmd: 1.0, proc: 2.0, mem: 3.0, band: 4.0 });
         result.difference = Some(Difference { psnr_db: 51.5, max_abs: 2, flip: Some(0.001) });
@@ -319,6 +331,10 @@ mod tests {
         assert_eq!(result["frame_ms"], serde_json::json!({"median": 2.0, "min": 1.0, "max": 4.0}));
         assert_eq!(result["passes"][0]["fragment_invocations"], 7);
         assert_eq!(result["passes"][0]["ms"]["median"], 1.0);
+        assert_eq!(result["passes"][0]["role"], "shading");
+        assert_eq!(result["passes"][0]["work"], "compute");
+        assert_eq!(result["passes"][0]["reads"][0]["role"], "lights");
+        assert_eq!(result["memory"]["buffers"][0]["role"], "lights");
         assert_eq!(result["passes"][0]["reads"][0]["bytes"], 10);
         assert_eq!(result["memory"]["buffers"][0]["bytes"], 10);
         assert_eq!(result["cost"]["band"], 4.0);
@@ -337,6 +353,42 @@ mod tests {
         json["settings"].as_object_mut().expect("is an object").remove("post");
         let old: Run = serde_json::from_value(json).expect("reads");
         assert_eq!(old.settings.post, "none");
+    }
+
+    #[test]
+    fn a_record_from_before_roles_reads() {
+        let pass: Pass = serde_json::from_value(serde_json::json!({
+            "name": "tiled/shade", "ms": null, "fragment_invocations": 7,
+            "reads": [{"name": "tiled/list", "bytes": 10}],
+        }))
+        .expect("reads");
+        assert_eq!((pass.role, pass.work, pass.reads[0].role), (None, None, None));
+        assert_eq!(pass.statistics["fragment_invocations"], 7);
+        let written = serde_json::to_value(&pass).expect("is JSON");
+        assert!(written.get("role").is_none() && written.get("work").is_none());
+    }
+
+    /// Every published record, whenever it was written.
+    #[test]
+    fn published_records_read() {
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/results");
+        let mut runs = 0;
+        for entry in std::fs::read_dir(folder).expect("is there") {
+            let path = entry.expect("is there").path();
+            if path.extension().is_none_or(|extension| extension != "json") {
+                continue;
+            }
+            let text = std::fs::read_to_string(&path).expect("reads");
+            let json: Value = serde_json::from_str(&text).expect("is JSON");
+            // The results of experiments have formats of their own.
+            if json.get("settings").is_some()
+                && json.get("results").is_some_and(|all| all[0].get("params").is_some())
+            {
+                let run: Run = serde_json::from_value(json).expect("is a run");
+                runs += usize::from(!run.results.is_empty());
+            }
+        }
+        assert!(runs > 0, "no run among the published records");
     }
 
     #[test]

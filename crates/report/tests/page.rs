@@ -12,6 +12,8 @@ fn run() -> Run {
     ok.frame_ms = Spread::of(&[12.0, 13.0, 15.0]);
     ok.passes = vec![Pass {
         name: "tiled/shade".into(),
+        role: None,
+        work: None,
         ms: Spread::of(&[9.0]),
         reads: Vec::new(),
         writes: Vec::new(),

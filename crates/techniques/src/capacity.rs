@@ -159,6 +159,7 @@ impl Frame<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use afterlight_graph::BufferRole;
 
     fn counter(needed: u32, capacity: u32, fixed: bool) -> Counter {
         Counter { name: "blocks".to_owned(), needed, capacity, dropped: 0, fixed }
@@ -208,7 +209,7 @@ mod tests {
     /// A resource for a demand that is not read.
     fn kept() -> ResourceId {
         let mut graph = Graph::new();
-        let buffer = graph.buffer("count", 8);
+        let buffer = graph.buffer("count", BufferRole::Counters, 8);
         graph.keep(&buffer)
     }
 }

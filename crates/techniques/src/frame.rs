@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 
 use afterlight_graph::{
-    BufferHandle, Graph, ImageHandle, ImageInfo,
+    BufferHandle, BufferRole, Graph, ImageHandle, ImageInfo, PassRole,
     gpu::{self, vk},
 };
 use afterlight_shader::Shader;
@@ -160,6 +160,7 @@ impl Frame<'_> {
         &self,
         graph: &mut Graph,
         name: &str,
+        role: BufferRole,
         words: &[u32],
     ) -> Result<BufferHandle, TechniqueError> {
         let words = if words.is_empty() { &[0] } else { words };
@@ -170,7 +171,7 @@ impl Frame<'_> {
             memory: gpu::MemoryKind::Upload,
         })?;
         buffer.write(0, bytemuck::cast_slice(words))?;
-        Ok(graph.import_buffer(name, &buffer))
+        Ok(graph.import_buffer(name, role, &buffer))
     }
 
     /// The device's format for depth with stencil.
@@ -263,9 +264,10 @@ impl Frame<'_> {
         &self,
         graph: &'g mut Graph,
         name: &str,
+        role: PassRole,
         shader: &Shader,
     ) -> afterlight_graph::ComputePass<'g> {
-        let mut pass = graph.compute(name, shader);
+        let mut pass = graph.compute(name, role, shader);
         self.bind_scene(&mut pass);
         for (name, bits) in self.constants(&[shader]) {
             pass.constant(&name, bits);

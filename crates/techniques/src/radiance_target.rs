@@ -1,6 +1,6 @@
 //! Where fragments that shade write: linear radiance, averaged over the samples of a pixel where there are several.
 
-use afterlight_graph::{Graph, ImageHandle, Load, RasterPass, gpu::vk};
+use afterlight_graph::{BufferRole, Graph, ImageHandle, Load, RasterPass, gpu::vk};
 
 use crate::frame::Frame;
 
@@ -15,12 +15,21 @@ impl RadianceTarget {
     pub fn new(graph: &mut Graph, frame: &Frame<'_>, technique: &str) -> Self {
         let format = vk::Format::R16G16B16A16_SFLOAT;
         if frame.samples == 1 {
-            let samples = graph.image(&format!("{technique}/radiance"), frame.image_info(format));
+            let samples =
+                graph.image(&format!("{technique}/radiance"), BufferRole::Targets, frame.image_info(format));
             return Self { samples, resolved: None };
         }
         Self {
-            samples: graph.image(&format!("{technique}/sample radiance"), frame.multisampled_info(format)),
-            resolved: Some(graph.image(&format!("{technique}/radiance"), frame.image_info(format))),
+            samples: graph.image(
+                &format!("{technique}/sample radiance"),
+                BufferRole::Targets,
+                frame.multisampled_info(format),
+            ),
+            resolved: Some(graph.image(
+                &format!("{technique}/radiance"),
+                BufferRole::Targets,
+                frame.image_info(format),
+            )),
         }
     }
 

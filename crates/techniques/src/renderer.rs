@@ -3,7 +3,7 @@
 use std::{cell::RefCell, sync::Arc};
 
 use afterlight_graph::{
-    Executor, FrameReport, Graph, ImageHandle, ResourceId,
+    BufferRole, Executor, FrameReport, Graph, ImageHandle, ResourceId,
     gpu::{self, vk},
 };
 use afterlight_scene::{Aabb, Camera, Environment, Light, Projection, Scene};
@@ -378,20 +378,33 @@ impl Renderer {
     fn import(&self, graph: &mut Graph, constants: &gpu::Buffer, draws: &DrawList) -> FrameBuffers {
         let s = &self.scene;
         FrameBuffers {
-            frame: graph.import_buffer("frame constants", constants),
-            draws: graph.import_buffer("scene draws", &s.draws),
-            draw_data: graph.import_image("scene draw records", &s.draw_data, UPLOADED),
-            materials: graph.import_image("scene materials", &s.materials, UPLOADED),
-            uv_transforms: graph.import_buffer("scene texture transforms", &s.uv_transforms),
-            lights: graph.import_image("lights", &self.lights.data, UPLOADED),
-            light_spheres: graph.import_image("light spheres", &self.lights.spheres, UPLOADED),
-            positions: graph.import_buffer("scene positions", &s.positions),
-            attributes: graph.import_buffer("scene attributes", &s.attributes),
-            indices: graph.import_buffer("scene indices", &s.indices),
-            commands: graph.import_buffer("draw commands", &draws.commands),
-            command_counts: graph.import_buffer("draw counts", &draws.counts),
-            volume: graph.import_buffer("light volume vertices", &self.volume),
-            volume_indices: graph.import_buffer("light volume indices", &self.volume_indices),
+            frame: graph.import_buffer("frame constants", BufferRole::Constants, constants),
+            draws: graph.import_buffer("scene draws", BufferRole::Scene, &s.draws),
+            draw_data: graph.import_image("scene draw records", BufferRole::Scene, &s.draw_data, UPLOADED),
+            materials: graph.import_image("scene materials", BufferRole::Scene, &s.materials, UPLOADED),
+            uv_transforms: graph.import_buffer(
+                "scene texture transforms",
+                BufferRole::Scene,
+                &s.uv_transforms,
+            ),
+            lights: graph.import_image("lights", BufferRole::Lights, &self.lights.data, UPLOADED),
+            light_spheres: graph.import_image(
+                "light spheres",
+                BufferRole::Lights,
+                &self.lights.spheres,
+                UPLOADED,
+            ),
+            positions: graph.import_buffer("scene positions", BufferRole::Scene, &s.positions),
+            attributes: graph.import_buffer("scene attributes", BufferRole::Scene, &s.attributes),
+            indices: graph.import_buffer("scene indices", BufferRole::Scene, &s.indices),
+            commands: graph.import_buffer("draw commands", BufferRole::Scene, &draws.commands),
+            command_counts: graph.import_buffer("draw counts", BufferRole::Scene, &draws.counts),
+            volume: graph.import_buffer("light volume vertices", BufferRole::Lights, &self.volume),
+            volume_indices: graph.import_buffer(
+                "light volume indices",
+                BufferRole::Lights,
+                &self.volume_indices,
+            ),
             rsm: None,
             shadow: None,
         }

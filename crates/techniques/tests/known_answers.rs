@@ -11,7 +11,7 @@ use afterlight_techniques::{
     Frame, Info, Params, Technique, TechniqueError,
     cost::{Cost, Workload},
     device_order, find, gbuffer,
-    graph::{Graph, ImageHandle, gpu::vk},
+    graph::{BufferRole, Graph, ImageHandle, PassRole, gpu::vk},
     registry,
     scene::{Camera, Light, Projection, builtin::edge_coverage},
 };
@@ -178,9 +178,11 @@ impl Technique for TiledWithBits {
         let filled = gbuffer::fill(graph, frame, "tiled", vk::Format::D32_SFLOAT)?;
         graph.keep(&filled.depth);
         let tiles = frame.width_px.div_ceil(16) * frame.height_px.div_ceil(16);
-        let bits = graph.buffer("bits", 4 * u64::from(tiles * frame.lights.count.div_ceil(32)));
-        let bits = graph.clear_buffer("clear bits", bits, 0);
-        let mut pass = frame.compute(graph, "tiled/shade", &frame.shader("tiled/shade.comp#emit")?);
+        let bits =
+            graph.buffer("bits", BufferRole::Lights, 4 * u64::from(tiles * frame.lights.count.div_ceil(32)));
+        let bits = graph.clear_buffer("clear bits", PassRole::LightAssignment, bits, 0);
+        let mut pass =
+            frame.compute(graph, "tiled/shade", PassRole::Shading, &frame.shader("tiled/shade.comp#emit")?);
         gbuffer::bind(&mut pass, &filled);
         let radiance = pass.write("hdr", filled.accumulation);
         let bits = pass.write("TileLights", bits);

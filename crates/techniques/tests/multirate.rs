@@ -4,7 +4,10 @@ mod common;
 
 use std::path::Path;
 
-use afterlight_techniques::{Indirect, Params, Renderer, Settings, find, graph::gpu};
+use afterlight_techniques::{
+    Indirect, Params, Renderer, Settings, find,
+    graph::{BufferRole, PassRole, gpu},
+};
 use common::{Stage, compiled, params, radiance_of};
 
 fn counts(device: &gpu::Device) -> Vec<u32> {
@@ -167,8 +170,8 @@ fn logluv_errors(stage: &Stage, decode: &[(&str, &str)]) -> [f64; 2] {
         find("forward").unwrap(),
         &Params::default(),
         |graph, _| {
-            let found = graph.buffer("test/found", 32 << 15);
-            let mut pass = graph.compute("test/logluv", &shader);
+            let found = graph.buffer("test/found", BufferRole::Counters, 32 << 15);
+            let mut pass = graph.compute("test/logluv", PassRole::Upkeep, &shader);
             let found = pass.write("Found", found);
             pass.dispatch([512, 1, 1]);
             pass.finish();

@@ -7,7 +7,7 @@ use afterlight_techniques::{
     Exactness, Frame, Info, Params, Renderer, Settings, Technique, TechniqueError, Transparency,
     cost::{Cost, Workload},
     find,
-    graph::{Graph, ImageHandle, ImageInfo, Load, gpu::vk},
+    graph::{BufferRole, Graph, ImageHandle, ImageInfo, Load, PassRole, gpu::vk},
     registry,
     scene::{
         Aabb, AlphaMode, Camera, Instance, Material, Mesh, Projection, Scene, VertexAttributes, load_source,
@@ -191,16 +191,20 @@ impl Technique for Flat {
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         if self.other_depth {
             let size = ImageInfo::new(vk::Format::D32_SFLOAT, frame.width_px, frame.height_px + 1);
-            let depth = graph.image("flat/depth", size.samples(frame.samples));
-            let mut pass = graph.raster("flat/depth");
+            let depth = graph.image("flat/depth", BufferRole::Depth, size.samples(frame.samples));
+            let mut pass = graph.raster("flat/depth", PassRole::DepthPrepass);
             // Nearer than everything.
             let depth = pass.depth(depth, Load::Clear(1.0));
             pass.finish();
             frame.hand_over_depth(depth);
         }
-        let image = graph.image("flat/radiance", frame.image_info(vk::Format::R16G16B16A16_SFLOAT));
+        let image = graph.image(
+            "flat/radiance",
+            BufferRole::Targets,
+            frame.image_info(vk::Format::R16G16B16A16_SFLOAT),
+        );
         let [r, g, b] = self.radiance;
-        Ok(graph.clear_image("flat/clear", image, [r, g, b, 1.0]))
+        Ok(graph.clear_image("flat/clear", PassRole::Shading, image, [r, g, b, 1.0]))
     }
 }
 

@@ -9,7 +9,7 @@ use afterlight_techniques::{
     Frame, Info, Params, Renderer, SceneGpu, Settings, Technique, TechniqueError,
     cost::{Cost, Workload},
     find,
-    graph::{Graph, ImageHandle, gpu, gpu::vk},
+    graph::{BufferRole, Graph, ImageHandle, PassRole, gpu, gpu::vk},
     scene::{Aabb, Camera, Instance, Material, Mesh, Scene, VertexAttributes, rng::SplitMix64},
     triangle_buffer,
 };
@@ -235,17 +235,22 @@ impl Technique for Records {
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let bits = triangle_buffer::bits(graph, frame, "test", u32::MAX);
         let triangles = triangle_buffer::store_marked(graph, frame, "test", bits, false)?;
-        let pixels = frame.table(graph, "test/pixels", &self.pixels)?;
-        let found = graph.buffer("test/found", 48 * self.pixels.len() as u64);
-        let mut pass = frame.compute(graph, "test/attributes", &frame.shader("test/attributes.comp")?);
+        let pixels = frame.table(graph, "test/pixels", BufferRole::Counters, &self.pixels)?;
+        let found = graph.buffer("test/found", BufferRole::Counters, 48 * self.pixels.len() as u64);
+        let mut pass =
+            frame.compute(graph, "test/attributes", PassRole::Upkeep, &frame.shader("test/attributes.comp")?);
         triangles.records.bind(&mut pass);
         pass.read("Pixels", &pixels);
         let found = pass.write("Found", found);
         pass.dispatch([self.pixels.len() as u32 / 128, 1, 1]);
         pass.finish();
         graph.keep(&found);
-        let radiance = graph.image("test/radiance", frame.image_info(vk::Format::R16G16B16A16_SFLOAT));
-        Ok(graph.clear_image("test/clear", radiance, [0.0; 4]))
+        let radiance = graph.image(
+            "test/radiance",
+            BufferRole::Targets,
+            frame.image_info(vk::Format::R16G16B16A16_SFLOAT),
+        );
+        Ok(graph.clear_image("test/clear", PassRole::Shading, radiance, [0.0; 4]))
     }
 }
 

@@ -6,7 +6,7 @@ use afterlight_techniques::{
     TechniqueError,
     cost::{Cost, Workload, tiled_deferred},
     gbuffer,
-    graph::{Graph, ImageHandle, gpu, gpu::vk},
+    graph::{Graph, ImageHandle, PassRole, gpu, gpu::vk},
     scene,
 };
 
@@ -60,7 +60,8 @@ impl Technique for Toon {
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let filled = gbuffer::fill(graph, frame, "toon", vk::Format::D32_SFLOAT)?;
-        let mut pass = frame.compute(graph, "toon/shade", &frame.shader("toon/toon.comp")?);
+        let mut pass =
+            frame.compute(graph, "toon/shade", PassRole::Shading, &frame.shader("toon/toon.comp")?);
         gbuffer::bind(&mut pass, &filled);
         pass.constant("LEVELS", frame.params.get(&LEVELS).parse::<u32>().unwrap_or(4));
         let radiance = pass.write("hdr", filled.accumulation);

@@ -444,15 +444,24 @@ fn account_text(cells: &[Cell], bandwidth: Option<Bandwidth>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use afterlight_measure::{Buffer, Memory};
+    use afterlight_measure::{Buffer, BufferRole, Memory};
 
     fn result(technique: &str, mib: u64, frame_ms: f64) -> RunResult {
         let mut result = RunResult::without_figures(technique, Status::Ok, "");
         result.reason = None;
         result.frame_ms = Spread::of(&[frame_ms]);
-        let buffers = [("ids", mib << 20), ("radiance", 64 << 20), ("cache entries", 1 << 20)];
-        let buffers =
-            buffers.map(|(part, bytes)| Buffer { name: format!("{technique}/{part}"), bytes }).to_vec();
+        let buffers = [
+            ("ids", BufferRole::Visibility, mib << 20),
+            ("radiance", BufferRole::Targets, 64 << 20),
+            ("cache entries", BufferRole::MemoizationCache, 1 << 20),
+        ];
+        let buffers = buffers
+            .map(|(part, role, bytes)| Buffer {
+                name: format!("{technique}/{part}"),
+                role: Some(role),
+                bytes,
+            })
+            .to_vec();
         result.memory = Some(Memory { technique_bytes: (mib + 65) << 20, peak_bytes: mib << 20, buffers });
         result
     }

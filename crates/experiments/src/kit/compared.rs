@@ -97,6 +97,8 @@ mod tests {
             result.memory = Some(Memory { technique_bytes: bytes, peak_bytes: bytes, buffers: Vec::new() });
             result.passes = vec![Pass {
                 name: format!("{technique}/shade"),
+                role: None,
+                work: None,
                 ms: Spread::of(&[ms]),
                 reads: Vec::new(),
                 writes: Vec::new(),

@@ -4,7 +4,10 @@ use afterlight_gpu::vk;
 use afterlight_shader::{BindingKind, Stage};
 
 use super::{FakeDevice, Slot, shader, with_constant, with_outputs, with_push};
-use crate::{DepthTest, Draw, DrawCall, Graph, GraphError, ImageInfo, Load, RasterState, Subresource};
+use crate::{
+    BufferRole, DepthTest, Draw, DrawCall, Graph, GraphError, ImageInfo, Load, PassRole, RasterState,
+    Subresource,
+};
 
 const COLOR: vk::Format = vk::Format::R8G8B8A8_UNORM;
 
@@ -25,12 +28,12 @@ fn names_all(message: &str, parts: &[&str]) {
 #[test]
 fn a_missing_slot() {
     let mut g = Graph::new();
-    let (a, list) = (g.buffer("a", 4), g.buffer("b", 4));
+    let (a, list) = (g.buffer("a", BufferRole::Lights, 4), g.buffer("b", BufferRole::Lights, 4));
     let slots =
         [Slot("lights", BindingKind::StorageBuffer, "r"), Slot("list", BindingKind::StorageBuffer, "w")];
     let cull = shader("tiled/cull.comp", Stage::Compute, &slots);
-    let _ = g.clear_buffer("clear", a, 0);
-    let mut pass = g.compute("tiled/cull", &cull);
+    let _ = g.clear_buffer("clear", PassRole::Upkeep, a, 0);
+    let mut pass = g.compute("tiled/cull", PassRole::LightAssignment, &cull);
     let _ = pass.write("list", list);
     pass.dispatch([1; 3]);
     names_all(&message(g), &["tiled/cull", "tiled/cull.comp", "\"lights\"", "storage buffer", "binds list"]);
@@ -39,9 +42,9 @@ fn a_missing_slot() {
 #[test]
 fn a_doubly_bound_slot() {
     let mut g = Graph::new();
-    let (a, b) = (g.buffer("first", 4), g.buffer("second", 4));
+    let (a, b) = (g.buffer("first", BufferRole::Lights, 4), g.buffer("second", BufferRole::Lights, 4));
     let cull = shader("cull", Stage::Compute, &[Slot("lights", BindingKind::StorageBuffer, "r")]);
-    let mut pass = g.compute("tiled/cull", &cull);
+    let mut pass = g.compute("tiled/cull", PassRole::LightAssignment, &cull);
     pass.read("lights", &a).read("lights", &b);
     names_all(&message(g), &["tiled/cull", "\"lights\"", "first", "second"]);
 }
@@ -49,10 +52,10 @@ fn a_doubly_bound_slot() {
 #[test]
 fn a_wrong_kind() {
     let mut g = Graph::new();
-    let image = g.image("map", ImageInfo::new(COLOR, 4, 4));
-    let image = g.clear_image("clear", image, [0.0; 4]);
+    let image = g.image("map", BufferRole::Targets, ImageInfo::new(COLOR, 4, 4));
+    let image = g.clear_image("clear", PassRole::Upkeep, image, [0.0; 4]);
     let cull = shader("cull", Stage::Compute, &[Slot("lights", BindingKind::StorageBuffer, "r")]);
-    let mut pass = g.compute("tiled/cull", &cull);
+    let mut pass = g.compute("tiled/cull", PassRole::LightAssignment, &cull);
     pass.read("lights", &image).has_effect();
     names_all(&message(g), &["tiled/cull", "\"lights\"", "image \"map\"", "storage buffer"]);
 }
@@ -60,9 +63,9 @@ fn a_wrong_kind() {
 #[test]
 fn wrong_samples() {
     let mut g = Graph::new();
-    let image = g.image("map", ImageInfo::new(COLOR, 4, 4).samples(4));
+    let image = g.image("map", BufferRole::Targets, ImageInfo::new(COLOR, 4, 4).samples(4));
     let cull = shader("cull", Stage::Compute, &[Slot("map", BindingKind::SampledImage, "r")]);
-    let mut pass = g.compute("p", &cull);
+    let mut pass = g.compute("p", PassRole::LightAssignment, &cull);
     pass.read("map", &image);
     names_all(&message(g), &["\"map\"", "4 samples"]);
 }
@@ -70,9 +73,9 @@ fn wrong_samples() {
 #[test]
 fn a_write_through_a_readonly_binding() {
     let mut g = Graph::new();
-    let buffer = g.buffer("b", 4);
+    let buffer = g.buffer("b", BufferRole::Lights, 4);
     let cull = shader("cull", Stage::Compute, &[Slot("lights", BindingKind::StorageBuffer, "r")]);
-    let mut pass = g.compute("p", &cull);
+    let mut pass = g.compute("p", PassRole::LightAssignment, &cull);
     let _ = pass.write("lights", buffer);
     names_all(&message(g), &["pass p", "\"lights\"", "found a write", "expected a read"]);
 }
@@ -80,10 +83,10 @@ fn a_write_through_a_readonly_binding() {
 #[test]
 fn a_read_through_a_writable_binding() {
     let mut g = Graph::new();
-    let buffer = g.buffer("b", 4);
-    let buffer = g.clear_buffer("clear", buffer, 0);
+    let buffer = g.buffer("b", BufferRole::Lights, 4);
+    let buffer = g.clear_buffer("clear", PassRole::Upkeep, buffer, 0);
     let cull = shader("cull", Stage::Compute, &[Slot("lights", BindingKind::StorageBuffer, "rw")]);
-    let mut pass = g.compute("p", &cull);
+    let mut pass = g.compute("p", PassRole::LightAssignment, &cull);
     pass.read("lights", &buffer);
     names_all(&message(g), &["pass p", "\"lights\"", "found a read", "expected a write"]);
 }
@@ -91,9 +94,9 @@ fn a_read_through_a_writable_binding() {
 #[test]
 fn an_unknown_written_slot() {
     let mut g = Graph::new();
-    let buffer = g.buffer("b", 4);
+    let buffer = g.buffer("b", BufferRole::Lights, 4);
     let cull = shader("cull", Stage::Compute, &[]);
-    let mut pass = g.compute("p", &cull);
+    let mut pass = g.compute("p", PassRole::LightAssignment, &cull);
     let _ = pass.write("list", buffer);
     names_all(&message(g), &["pass p", "\"list\"", "expected one of: nothing"]);
 }
@@ -102,12 +105,12 @@ fn an_unknown_written_slot() {
 fn an_unknown_constant_and_wrong_push_bytes() {
     let mut g = Graph::new();
     let cull = with_constant(shader("cull", Stage::Compute, &[]), "TILE");
-    g.compute("p", &cull).constant("TILES", 16u32).dispatch([1; 3]);
+    g.compute("p", PassRole::LightAssignment, &cull).constant("TILES", 16u32).dispatch([1; 3]);
     names_all(&message(g), &["pass p", "\"TILES\"", "TILE"]);
 
     let mut g = Graph::new();
     let cull = with_push(shader("cull", Stage::Compute, &[]), 16);
-    g.compute("p", &cull).push(&[0u32; 2]).dispatch([1; 3]);
+    g.compute("p", PassRole::LightAssignment, &cull).push(&[0u32; 2]).dispatch([1; 3]);
     names_all(&message(g), &["pass p", "found 8 bytes", "expected 16"]);
 }
 
@@ -115,15 +118,15 @@ fn an_unknown_constant_and_wrong_push_bytes() {
 fn a_wrong_stage() {
     let mut g = Graph::new();
     let cull = shader("cull", Stage::Fragment, &[]);
-    g.compute("p", &cull).dispatch([1; 3]);
+    g.compute("p", PassRole::LightAssignment, &cull).dispatch([1; 3]);
     names_all(&message(g), &["pass p", "cull", "Fragment", "Compute"]);
 }
 
 /// A raster pass `p` with one colour and a draw, which does not plan.
 fn draw_message(state: RasterState) -> String {
     let mut g = Graph::new();
-    let image = g.image("a", ImageInfo::new(COLOR, 4, 4));
-    let mut pass = g.raster("p");
+    let image = g.image("a", BufferRole::Targets, ImageInfo::new(COLOR, 4, 4));
+    let mut pass = g.raster("p", PassRole::Shading);
     let _ = pass.color(image, Load::DontCare);
     pass.draw(Draw::new(state, DrawCall::vertices(3)));
     message(g)
@@ -156,26 +159,26 @@ fn stages_between_vertices_and_fragments_that_do_not_fit() {
 #[test]
 fn a_read_before_any_write() {
     let mut g = Graph::new();
-    let buffer = g.buffer("list", 4);
+    let buffer = g.buffer("list", BufferRole::Lights, 4);
     let cull = shader("cull", Stage::Compute, &[Slot("list", BindingKind::StorageBuffer, "r")]);
-    g.compute("p", &cull).read("list", &buffer);
+    g.compute("p", PassRole::LightAssignment, &cull).read("list", &buffer);
     names_all(&message(g), &["pass p", "\"list\"", "before any pass has written it"]);
 
     let mut g = Graph::new();
-    let image = g.image("hdr", ImageInfo::new(COLOR, 4, 4));
-    let _ = g.raster("p").color(image, Load::Keep);
+    let image = g.image("hdr", BufferRole::Targets, ImageInfo::new(COLOR, 4, 4));
+    let _ = g.raster("p", PassRole::Shading).color(image, Load::Keep);
     names_all(&message(g), &["pass p", "\"hdr\""]);
 }
 
 #[test]
 fn feedback() {
     let mut g = Graph::new();
-    let image = g.image("hdr", ImageInfo::new(COLOR, 4, 4));
-    let image = g.clear_image("clear", image, [0.0; 4]);
+    let image = g.image("hdr", BufferRole::Targets, ImageInfo::new(COLOR, 4, 4));
+    let image = g.clear_image("clear", PassRole::Upkeep, image, [0.0; 4]);
     let vertex = shader("v", Stage::Vertex, &[]);
     let fragment =
         with_outputs(shader("f", Stage::Fragment, &[Slot("map", BindingKind::SampledImage, "r")]), 1);
-    let mut pass = g.raster("p");
+    let mut pass = g.raster("p", PassRole::Shading);
     pass.read("map", &image);
     let _ = pass.color(image, Load::Keep);
     pass.draw(Draw::new(RasterState::new(&vertex, Some(&fragment)), DrawCall::vertices(3)));
@@ -188,26 +191,29 @@ fn attachments_that_do_not_fit() {
     let state = RasterState::new(&vertex, None).depth(DepthTest::NEAREST);
 
     let mut g = Graph::new();
-    let image = g.image("a", ImageInfo::new(COLOR, 4, 4));
-    let mut pass = g.raster("p");
+    let image = g.image("a", BufferRole::Targets, ImageInfo::new(COLOR, 4, 4));
+    let mut pass = g.raster("p", PassRole::Shading);
     let _ = pass.color(image, Load::DontCare);
     pass.draw(Draw::new(state.clone(), DrawCall::vertices(3)));
     names_all(&message(g), &["pass p", "writes depth", "depth attachment"]);
 
     let mut g = Graph::new();
-    let (a, b) = (g.image("a", ImageInfo::new(COLOR, 4, 4)), g.image("b", ImageInfo::new(COLOR, 5, 4)));
-    let mut pass = g.raster("p");
+    let (a, b) = (
+        g.image("a", BufferRole::Targets, ImageInfo::new(COLOR, 4, 4)),
+        g.image("b", BufferRole::Targets, ImageInfo::new(COLOR, 5, 4)),
+    );
+    let mut pass = g.raster("p", PassRole::Shading);
     let _ = (pass.color(a, Load::DontCare), pass.color(b, Load::DontCare));
     names_all(&message(g), &["pass p", "5x4", "4x4"]);
 
     let mut g = Graph::new();
-    g.raster("p").draw(Draw::new(RasterState::new(&vertex, None), DrawCall::vertices(3)));
+    g.raster("p", PassRole::Shading).draw(Draw::new(RasterState::new(&vertex, None), DrawCall::vertices(3)));
     names_all(&message(g), &["pass p", "at least one attachment"]);
 
     let mut g = Graph::new();
-    let image = g.image("a", ImageInfo::new(COLOR, 4, 4));
+    let image = g.image("a", BufferRole::Targets, ImageInfo::new(COLOR, 4, 4));
     let fragment = with_outputs(shader("f", Stage::Fragment, &[]), 2);
-    let mut pass = g.raster("p");
+    let mut pass = g.raster("p", PassRole::Shading);
     let _ = pass.color(image, Load::DontCare);
     pass.draw(Draw::new(RasterState::new(&vertex, Some(&fragment)), DrawCall::vertices(3)));
     names_all(&message(g), &["pass p", "location 1", "below 1"]);
@@ -216,16 +222,16 @@ fn attachments_that_do_not_fit() {
 #[test]
 fn bad_resources_and_ranges() {
     let mut g = Graph::new();
-    let _ = g.image("empty", ImageInfo::new(COLOR, 0, 4));
+    let _ = g.image("empty", BufferRole::Targets, ImageInfo::new(COLOR, 0, 4));
     names_all(&message(g), &["\"empty\"", "0x4", "1x1"]);
 
     let mut g = Graph::new();
-    let _ = (g.buffer("twin", 4), g.buffer("twin", 4));
+    let _ = (g.buffer("twin", BufferRole::Lights, 4), g.buffer("twin", BufferRole::Lights, 4));
     names_all(&message(g), &["\"twin\"", "declared twice"]);
 
     let mut g = Graph::new();
-    let image = g.image("a", ImageInfo::new(COLOR, 4, 4).mips(2));
-    let _ = g.clear_image_range("p", image, Subresource::mip(2), [0.0; 4]);
+    let image = g.image("a", BufferRole::Targets, ImageInfo::new(COLOR, 4, 4).mips(2));
+    let _ = g.clear_image_range("p", PassRole::Upkeep, image, Subresource::mip(2), [0.0; 4]);
     names_all(&message(g), &["pass p", "mips 2+1", "2 mips"]);
 }
 
@@ -237,8 +243,8 @@ fn a_range_that_the_shader_cannot_see() {
         (ImageInfo::new(COLOR, 4, 4).layers(2), ["pass p", "in slot to", "2 layers", "1 layer"]),
     ] {
         let mut g = Graph::new();
-        let image = g.image("many", info);
-        let _ = g.compute("p", &store).write("to", image);
+        let image = g.image("many", BufferRole::Targets, info);
+        let _ = g.compute("p", PassRole::LightAssignment, &store).write("to", image);
         names_all(&message(g), &parts);
     }
 }
@@ -246,8 +252,8 @@ fn a_range_that_the_shader_cannot_see() {
 #[test]
 fn a_handle_of_another_graph() {
     let mut other = Graph::new();
-    let foreign = other.buffer("b", 4);
+    let foreign = other.buffer("b", BufferRole::Lights, 4);
     let mut g = Graph::new();
-    let _ = g.clear_buffer("p", foreign, 0);
+    let _ = g.clear_buffer("p", PassRole::Upkeep, foreign, 0);
     assert!(matches!(g.plan(&FakeDevice), Err(GraphError::ForeignHandle { .. })));
 }

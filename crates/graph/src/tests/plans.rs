@@ -7,8 +7,8 @@ use proptest::prelude::*;
 use super::checker::Checker;
 use super::{FakeDevice, Slot, shader, with_outputs};
 use crate::{
-    BufferHandle, DepthTest, Draw, DrawCall, Graph, ImageHandle, ImageInfo, Load, Plan, RasterState,
-    Subresource,
+    BufferHandle, BufferRole, DepthTest, Draw, DrawCall, Graph, ImageHandle, ImageInfo, Load, PassRole,
+    PassWork, Plan, RasterState, Subresource,
 };
 
 const COLOR: vk::Format = vk::Format::R8G8B8A8_UNORM;
@@ -16,7 +16,7 @@ const DEPTH: vk::Format = vk::Format::D32_SFLOAT_S8_UINT;
 
 fn fill(g: &mut Graph, name: &str, buffer: BufferHandle) -> BufferHandle {
     let shader = shader(name, Stage::Compute, &[Slot("out", BindingKind::StorageBuffer, "w")]);
-    let mut pass = g.compute(name, &shader);
+    let mut pass = g.compute(name, PassRole::LightAssignment, &shader);
     let buffer = pass.write("out", buffer);
     pass.dispatch([1; 3]);
     buffer
@@ -25,7 +25,7 @@ fn fill(g: &mut Graph, name: &str, buffer: BufferHandle) -> BufferHandle {
 fn map(g: &mut Graph, name: &str, from: &BufferHandle, to: BufferHandle) -> BufferHandle {
     let slots = [Slot("from", BindingKind::StorageBuffer, "r"), Slot("to", BindingKind::StorageBuffer, "w")];
     let shader = shader(name, Stage::Compute, &slots);
-    let mut pass = g.compute(name, &shader);
+    let mut pass = g.compute(name, PassRole::LightAssignment, &shader);
     pass.read("from", from);
     let to = pass.write("to", to);
     pass.dispatch([1; 3]);
@@ -35,13 +35,13 @@ fn map(g: &mut Graph, name: &str, from: &BufferHandle, to: BufferHandle) -> Buff
 /// A chain of `count` buffers, each made from the one before; the last or all kept.
 fn chain(count: usize, keep_all: bool) -> Plan {
     let mut g = Graph::new();
-    let first = g.buffer("b0", 1000);
+    let first = g.buffer("b0", BufferRole::Lights, 1000);
     let mut last = fill(&mut g, "p0", first);
     for index in 1..count {
         if keep_all {
             g.keep(&last);
         }
-        let next = g.buffer(&format!("b{index}"), 1000);
+        let next = g.buffer(&format!("b{index}"), BufferRole::Lights, 1000);
         last = map(&mut g, &format!("p{index}"), &last, next);
     }
     g.keep(&last);
@@ -70,9 +70,9 @@ fn traffic_is_told_by_pass() {
 
     for (load, reads) in [(Load::Clear([0.0; 4]), false), (Load::Keep, true)] {
         let mut g = Graph::new();
-        let image = g.image("hdr", ImageInfo::new(COLOR, 64, 64));
-        let image = g.clear_image("clear", image, [0.0; 4]);
-        let mut pass = g.raster("raster");
+        let image = g.image("hdr", BufferRole::Targets, ImageInfo::new(COLOR, 64, 64));
+        let image = g.clear_image("clear", PassRole::Upkeep, image, [0.0; 4]);
+        let mut pass = g.raster("raster", PassRole::Shading);
         let image = pass.color(image, load);
         pass.finish();
         g.keep(&image);
@@ -85,7 +85,11 @@ fn traffic_is_told_by_pass() {
 #[test]
 fn passes_without_use_are_dropped() {
     let mut g = Graph::new();
-    let (a, b, c) = (g.buffer("a", 16), g.buffer("b", 16), g.buffer("c", 16));
+    let (a, b, c) = (
+        g.buffer("a", BufferRole::Lights, 16),
+        g.buffer("b", BufferRole::Lights, 16),
+        g.buffer("c", BufferRole::Lights, 16),
+    );
     let a = fill(&mut g, "used", a);
     let b = map(&mut g, "unused", &a, b);
     let _ = map(&mut g, "unused too", &b, c);
@@ -99,9 +103,9 @@ fn passes_without_use_are_dropped() {
 #[test]
 fn an_overwritten_version_is_dropped() {
     let mut g = Graph::new();
-    let image = g.image("hdr", ImageInfo::new(COLOR, 64, 64));
-    let image = g.clear_image("first", image, [0.0; 4]);
-    let image = g.clear_image("second", image, [1.0; 4]);
+    let image = g.image("hdr", BufferRole::Targets, ImageInfo::new(COLOR, 64, 64));
+    let image = g.clear_image("first", PassRole::Upkeep, image, [0.0; 4]);
+    let image = g.clear_image("second", PassRole::Upkeep, image, [1.0; 4]);
     g.keep(&image);
     let plan = g.plan(&FakeDevice).expect("a valid frame");
     assert_eq!(plan.dropped, ["first"]);
@@ -110,10 +114,10 @@ fn an_overwritten_version_is_dropped() {
 #[test]
 fn readers_share_one_barrier() {
     let mut g = Graph::new();
-    let a = g.buffer("a", 16);
+    let a = g.buffer("a", BufferRole::Lights, 16);
     let a = fill(&mut g, "write", a);
     for index in 0..3 {
-        let out = g.buffer(&format!("out{index}"), 16);
+        let out = g.buffer(&format!("out{index}"), BufferRole::Lights, 16);
         let out = map(&mut g, &format!("read{index}"), &a, out);
         g.keep(&out);
     }
@@ -125,12 +129,13 @@ fn readers_share_one_barrier() {
 #[test]
 fn mip_levels_are_tracked_apart() {
     let mut g = Graph::new();
-    let image = g.image("pyramid", ImageInfo::new(vk::Format::R32_SFLOAT, 64, 64).mips(3));
-    let mut image = g.clear_image_range("top", image, Subresource::mip(0), [0.5; 4]);
+    let image =
+        g.image("pyramid", BufferRole::Targets, ImageInfo::new(vk::Format::R32_SFLOAT, 64, 64).mips(3));
+    let mut image = g.clear_image_range("top", PassRole::Upkeep, image, Subresource::mip(0), [0.5; 4]);
     let slots = [Slot("from", BindingKind::SampledImage, "r"), Slot("to", BindingKind::StorageImage, "w")];
     let down = shader("down", Stage::Compute, &slots);
     for mip in 1..3 {
-        let mut pass = g.compute(&format!("down{mip}"), &down);
+        let mut pass = g.compute(&format!("down{mip}"), PassRole::LightAssignment, &down);
         pass.read_range("from", &image, Subresource::mip(mip - 1));
         image = pass.write_range("to", image, Subresource::mip(mip));
         pass.dispatch([1; 3]);
@@ -145,8 +150,11 @@ fn mip_levels_are_tracked_apart() {
 fn depth_is_sampled_while_the_stencil_is_written() {
     let mut g = Graph::new();
     let info = ImageInfo::new(DEPTH, 32, 32);
-    let (depth, color) = (g.image("depth", info), g.image("color", ImageInfo::new(COLOR, 32, 32)));
-    let mut pass = g.raster("prepass");
+    let (depth, color) = (
+        g.image("depth", BufferRole::Depth, info),
+        g.image("color", BufferRole::Targets, ImageInfo::new(COLOR, 32, 32)),
+    );
+    let mut pass = g.raster("prepass", PassRole::DepthPrepass);
     let depth = pass.depth(depth, Load::Clear(0.0));
     pass.stencil_clear(0);
     let vertex = shader("v", Stage::Vertex, &[]);
@@ -155,7 +163,7 @@ fn depth_is_sampled_while_the_stencil_is_written() {
         shader("f", Stage::Fragment, &[Slot("depth", BindingKind::CombinedImageSampler, "r")]),
         1,
     );
-    let mut pass = g.raster("light");
+    let mut pass = g.raster("light", PassRole::Shading);
     pass.read("depth", &depth);
     let color = pass.color(color, Load::Clear([0.0; 4]));
     let depth = pass.stencil(depth, Load::Keep);
@@ -172,8 +180,9 @@ fn depth_is_sampled_while_the_stencil_is_written() {
 fn imported_images_return_to_their_layout() {
     let mut g = Graph::new();
     let info = ImageInfo::new(COLOR, 8, 8);
-    let image = g.import_fake("outside", info, vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL);
-    let image = g.clear_image("clear", image, [0.0; 4]);
+    let image =
+        g.import_fake("outside", BufferRole::Targets, info, vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL);
+    let image = g.clear_image("clear", PassRole::Upkeep, image, [0.0; 4]);
     assert_eq!(image.info(), info);
     let plan = g.plan(&FakeDevice).expect("a valid frame");
     assert_eq!(plan.passes.len(), 1, "writing an imported image is a use");
@@ -185,7 +194,11 @@ fn imported_images_return_to_their_layout() {
 #[test]
 fn outputs_and_shared_work_are_no_technique_bytes() {
     let mut g = Graph::new();
-    let (a, b, c) = (g.buffer("shared/shadow", 100), g.buffer("list", 100), g.buffer("out", 100));
+    let (a, b, c) = (
+        g.buffer("shared/shadow", BufferRole::Shared, 100),
+        g.buffer("list", BufferRole::Lights, 100),
+        g.buffer("out", BufferRole::Lights, 100),
+    );
     let a = fill(&mut g, "shared/map", a);
     let b = map(&mut g, "make", &a, b);
     let c = map(&mut g, "use", &b, c);
@@ -193,6 +206,50 @@ fn outputs_and_shared_work_are_no_technique_bytes() {
     g.keep(&c);
     let plan = g.plan(&FakeDevice).expect("a valid frame");
     assert_eq!(plan.technique_bytes(), 256);
+}
+
+/// Names say nothing: `shared/…` without the role of shared work is a technique's own.
+#[test]
+fn roles_travel_from_declaration_to_plan() {
+    let mut g = Graph::new();
+    let list = g.buffer("shared/list", BufferRole::Lights, 100);
+    let list = g.clear_buffer("shared/clear", PassRole::LightAssignment, list, 0);
+    let copy = g.buffer("copy", BufferRole::SurfaceListNodes, 100);
+    let copy = g.copy_buffer("copied", PassRole::Geometry, &list, copy);
+    let target = g.image("target", BufferRole::Shared, ImageInfo::new(COLOR, 4, 4));
+    let target = g.clear_image("map", PassRole::Shared, target, [0.0; 4]);
+    let slots = [Slot("from", BindingKind::StorageBuffer, "r"), Slot("to", BindingKind::StorageImage, "w")];
+    let mut pass = g.compute("shade", PassRole::Shading, &shader("shade", Stage::Compute, &slots));
+    pass.read("from", &copy);
+    let target = pass.write("to", target);
+    pass.dispatch([1; 3]);
+    pass.finish();
+    let mut pass = g.raster("draw", PassRole::Transparency);
+    let target = pass.color(target, Load::Keep);
+    pass.finish();
+    g.keep(&target);
+    let plan = g.plan(&FakeDevice).expect("a valid frame");
+
+    let passes: Vec<_> = plan.passes.iter().map(|pass| (pass.role, pass.work)).collect();
+    assert_eq!(
+        passes,
+        [
+            (PassRole::LightAssignment, PassWork::Clear),
+            (PassRole::Geometry, PassWork::Copy),
+            (PassRole::Shared, PassWork::Clear),
+            (PassRole::Shading, PassWork::Compute),
+            (PassRole::Transparency, PassWork::Raster),
+        ]
+    );
+    let resources: Vec<_> = plan.resources.iter().map(|one| (one.role, one.shared())).collect();
+    assert_eq!(
+        resources,
+        [(BufferRole::Lights, false), (BufferRole::SurfaceListNodes, false), (BufferRole::Shared, true)]
+    );
+    let traffic: Vec<_> =
+        plan.traffic(&plan.passes[3]).iter().map(|one| (one.role, one.read, one.written)).collect();
+    assert_eq!(traffic, [(BufferRole::SurfaceListNodes, true, false), (BufferRole::Shared, false, true)]);
+    assert_eq!(plan.technique_bytes(), 512);
 }
 
 /// The checker must see what it is there to see.
@@ -278,7 +335,7 @@ fn random_compute(frame: &mut Frame, name: &str, picks: &[u8]) {
     let slots: Vec<Slot> =
         plan.iter().zip(SLOT_NAMES).map(|((_, _, kind, mode, _), slot)| Slot(slot, *kind, mode)).collect();
     let shader = shader(name, Stage::Compute, &slots);
-    let mut pass = frame.graph.compute(name, &shader);
+    let mut pass = frame.graph.compute(name, PassRole::LightAssignment, &shader);
     for ((target, read, _, _, range), slot) in plan.iter().zip(SLOT_NAMES) {
         if *target < frame.images.len() {
             let (handle, holds) = &mut frame.images[*target];
@@ -308,7 +365,7 @@ fn random_compute(frame: &mut Frame, name: &str, picks: &[u8]) {
 
 fn random_raster(frame: &mut Frame, name: &str, picks: &[u8]) {
     let depth_index = frame.images.len() - 1;
-    let mut pass = frame.graph.raster(name);
+    let mut pass = frame.graph.raster(name, PassRole::Shading);
     let mut colors = 0;
     // Images 0 and 1 have one level and the depth image's extent.
     for (index, pick) in picks.iter().take(2).enumerate() {
@@ -357,7 +414,7 @@ fn random_transfer(frame: &mut Frame, name: &str, picks: &[u8]) {
         let image = handle.take().expect("handles come back");
         let whole = pick & 64 != 0 || !*holds;
         let range = if whole { Subresource::ALL } else { Subresource::mip(image.info().mips - 1) };
-        *handle = Some(graph.clear_image_range(name, image, range, [0.0; 4]));
+        *handle = Some(graph.clear_image_range(name, PassRole::Upkeep, image, range, [0.0; 4]));
         *holds = true;
     } else {
         let (dst, src) =
@@ -365,8 +422,8 @@ fn random_transfer(frame: &mut Frame, name: &str, picks: &[u8]) {
         let to = frame.buffers[dst].0.take().expect("handles come back");
         let copies = src != dst && frame.buffers[src].1;
         frame.buffers[dst].0 = Some(match &frame.buffers[src].0 {
-            Some(from) if copies => graph.copy_buffer(name, from, to),
-            _ => graph.clear_buffer(name, to, 0),
+            Some(from) if copies => graph.copy_buffer(name, PassRole::Upkeep, from, to),
+            _ => graph.clear_buffer(name, PassRole::Upkeep, to, 0),
         });
         frame.buffers[dst].1 = true;
     }
@@ -387,13 +444,18 @@ fn random_graph(steps: &[Step], kept: u16, keep_all: bool) -> Graph {
         .map(|(index, info)| {
             let name = format!("image{index}");
             match index {
-                3 => (Some(graph.import_fake(&name, *info, vk::ImageLayout::GENERAL)), true),
-                _ => (Some(graph.image(&name, *info)), false),
+                3 => (
+                    Some(graph.import_fake(&name, BufferRole::Targets, *info, vk::ImageLayout::GENERAL)),
+                    true,
+                ),
+                _ => (Some(graph.image(&name, BufferRole::Targets, *info)), false),
             }
         })
         .collect();
     let buffers = (0..5)
-        .map(|index| (Some(graph.buffer(&format!("buffer{index}"), 300 * (index + 1))), false))
+        .map(|index| {
+            (Some(graph.buffer(&format!("buffer{index}"), BufferRole::Lights, 300 * (index + 1))), false)
+        })
         .collect();
     let mut frame = Frame { graph, images, buffers };
     for (index, (kind, picks)) in steps.iter().enumerate() {

@@ -4,7 +4,7 @@
 //! the cells that hold a surface; another walks down the tree over the lights (`light_bvh/`) for each of them. No list has a bound:
 //! what is found is counted before it is written, and a frame that had less room is recorded again.
 
-use afterlight_graph::{BufferHandle, ComputePass, Graph, ImageHandle};
+use afterlight_graph::{BufferHandle, BufferRole, ComputePass, Graph, ImageHandle, PassRole};
 
 use afterlight_shader::Shader;
 
@@ -278,13 +278,13 @@ impl<'a> Stage<'a> {
     }
 
     fn zeroed(&self, graph: &mut Graph, name: &str) -> BufferHandle {
-        let buffer = graph.buffer(&self.name(name), 8);
-        graph.clear_buffer(&self.name(&format!("clear {name}")), buffer, 0)
+        let buffer = graph.buffer(&self.name(name), BufferRole::Lights, 8);
+        graph.clear_buffer(&self.name(&format!("clear {name}")), PassRole::LightAssignment, buffer, 0)
     }
 
     /// A pass `technique/name` of a shader of the stage, with those of the stage's constants that the shader has.
     fn pass<'g>(&self, graph: &'g mut Graph, name: &str, shader: &Shader) -> ComputePass<'g> {
-        let mut pass = self.frame.compute(graph, &self.name(name), shader);
+        let mut pass = self.frame.compute(graph, &self.name(name), PassRole::LightAssignment, shader);
         for (constant, value) in &self.constants {
             if shader.reflection.spec_constant(constant).is_some() {
                 pass.constant(constant, *value);
@@ -295,8 +295,9 @@ impl<'a> Stage<'a> {
 
     /// Cells that hold a surface.
     fn find_cells(&self, graph: &mut Graph, surfaces: &Surfaces<'_>) -> Result<FoundCells, TechniqueError> {
-        let cells = graph.buffer(&self.name("cells"), 16 * u64::from(self.cell_capacity.max(1)));
-        let words = graph.buffer(&self.name("cell words"), 8 * self.words.max(1));
+        let cells =
+            graph.buffer(&self.name("cells"), BufferRole::Lights, 16 * u64::from(self.cell_capacity.max(1)));
+        let words = graph.buffer(&self.name("cell words"), BufferRole::Lights, 8 * self.words.max(1));
         let count = self.zeroed(graph, "cell count");
         let shader = self.frame.shader(&format!("clusters/cells.comp{}", surfaces.tag))?;
         let mut pass = self.pass(graph, "cells", &shader);
@@ -317,8 +318,16 @@ impl<'a> Stage<'a> {
         found: &FoundCells,
         tree: &LightBvh,
     ) -> Result<(BufferHandle, BufferHandle), TechniqueError> {
-        let lists = graph.buffer(&self.name("cell lists"), 4 * u64::from(self.list_capacity.max(1)));
-        let ends = graph.buffer(&self.name("list ends"), 8 * u64::from(self.cell_capacity.max(1)));
+        let lists = graph.buffer(
+            &self.name("cell lists"),
+            BufferRole::Lights,
+            4 * u64::from(self.list_capacity.max(1)),
+        );
+        let ends = graph.buffer(
+            &self.name("list ends"),
+            BufferRole::Lights,
+            8 * u64::from(self.cell_capacity.max(1)),
+        );
         let count = self.zeroed(graph, "list count");
         let mut pass = self.pass(graph, "assign lights", &self.frame.shader("clusters/assign.comp")?);
         pass.read("Cells", &found.cells).read("CellCount", &found.count);

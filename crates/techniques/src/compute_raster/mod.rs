@@ -4,7 +4,7 @@
 //! that cross the near plane, are listed, cut into tiles and rasterised a group a tile. The lists' capacities are counted: a
 //! frame that needs more is recorded again.
 
-use afterlight_graph::{BufferHandle, Graph};
+use afterlight_graph::{BufferHandle, BufferRole, Graph, PassRole};
 
 use crate::{
     Info,
@@ -82,20 +82,21 @@ pub fn rasterize(
     let large_capacity = frame.capacity("large_triangles", FIRST_LARGE);
     let job_capacity = frame.capacity("tile_jobs", FIRST_JOBS);
     let name = |stage: &str| format!("{technique}/{stage}");
-    let keys = graph.buffer(&name("sample keys"), bytes);
-    let large = graph.buffer(&name("large triangles"), 4 * u64::from(large_capacity));
-    let jobs = graph.buffer(&name("tile jobs"), 8 * u64::from(job_capacity));
-    let large_count = graph.buffer(&name("large count"), 8);
-    let job_count = graph.buffer(&name("job count"), 8);
-    let keys = graph.clear_buffer(&name("clear keys"), keys, 0);
-    let large_count = graph.clear_buffer(&name("clear large count"), large_count, 0);
-    let job_count = graph.clear_buffer(&name("clear job count"), job_count, 0);
+    let keys = graph.buffer(&name("sample keys"), BufferRole::SampleKeys, bytes);
+    let large =
+        graph.buffer(&name("large triangles"), BufferRole::RasterQueues, 4 * u64::from(large_capacity));
+    let jobs = graph.buffer(&name("tile jobs"), BufferRole::RasterQueues, 8 * u64::from(job_capacity));
+    let large_count = graph.buffer(&name("large count"), BufferRole::RasterQueues, 8);
+    let job_count = graph.buffer(&name("job count"), BufferRole::RasterQueues, 8);
+    let keys = graph.clear_buffer(&name("clear keys"), PassRole::Geometry, keys, 0);
+    let large_count = graph.clear_buffer(&name("clear large count"), PassRole::Geometry, large_count, 0);
+    let job_count = graph.clear_buffer(&name("clear job count"), PassRole::Geometry, job_count, 0);
 
     let has_masked = frame.scene.has_masked();
     let variant = |shader: &str| if has_masked { format!("{shader}#mask") } else { shader.to_owned() };
     // One pass for opaque and masked surfaces: a few slow threads of alpha tests then have company.
     let shader = frame.shader(&variant("compute_raster/triangles.comp"))?;
-    let mut pass = frame.compute(graph, &name("triangles"), &shader);
+    let mut pass = frame.compute(graph, &name("triangles"), PassRole::Geometry, &shader);
     pass.constant("SAMPLES", samples)
         .constant("LARGE_CAPACITY", large_capacity)
         .constant("SMALL_PX", small_px);
@@ -115,7 +116,8 @@ pub fn rasterize(
     }
     pass.finish();
 
-    let mut pass = frame.compute(graph, &name("bin"), &frame.shader("compute_raster/bin.comp")?);
+    let mut pass =
+        frame.compute(graph, &name("bin"), PassRole::Geometry, &frame.shader("compute_raster/bin.comp")?);
     pass.constant("LARGE_CAPACITY", large_capacity).constant("JOB_CAPACITY", job_capacity);
     pass.read("DrawCommands", &frame.buffers.commands);
     pass.read("LargeTriangles", &large).read("LargeCount", &large_count);
@@ -125,7 +127,7 @@ pub fn rasterize(
     pass.finish();
 
     let shader = frame.shader(&variant("compute_raster/large.comp"))?;
-    let mut pass = frame.compute(graph, &name("large triangles"), &shader);
+    let mut pass = frame.compute(graph, &name("large triangles"), PassRole::Geometry, &shader);
     pass.constant("SAMPLES", samples).constant("JOB_CAPACITY", job_capacity);
     pass.read("DrawCommands", &frame.buffers.commands).read("TileJobs", &jobs).read("JobCount", &job_count);
     let keys = pass.write("SampleKeys", keys);

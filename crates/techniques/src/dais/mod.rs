@@ -6,7 +6,7 @@ mod passes;
 
 pub(crate) use passes::{FillPass, depth_surfaces};
 
-use afterlight_graph::{BufferHandle, Graph, ImageHandle, Load, RasterPass, gpu::vk};
+use afterlight_graph::{BufferHandle, BufferRole, Graph, ImageHandle, Load, PassRole, RasterPass, gpu::vk};
 
 use crate::{
     ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, ParamInfo, ParamKind, Params, Source, Technique,
@@ -67,11 +67,19 @@ impl Cache {
     pub fn new(graph: &mut Graph, frame: &Frame<'_>, info: &Info) -> Self {
         let buckets = frame.params.number(info, CACHE_BUCKETS.key) as u32;
         let technique = info.id;
-        let entries = graph.buffer(&format!("{technique}/cache entries"), 16 * u64::from(buckets));
-        let locks = graph.buffer(&format!("{technique}/cache locks"), 4 * u64::from(buckets));
+        let entries = graph.buffer(
+            &format!("{technique}/cache entries"),
+            BufferRole::MemoizationCache,
+            16 * u64::from(buckets),
+        );
+        let locks = graph.buffer(
+            &format!("{technique}/cache locks"),
+            BufferRole::MemoizationCache,
+            4 * u64::from(buckets),
+        );
         Self {
-            entries: graph.clear_buffer(&format!("{technique}/clear cache"), entries, 0),
-            locks: graph.clear_buffer(&format!("{technique}/clear locks"), locks, 0),
+            entries: graph.clear_buffer(&format!("{technique}/clear cache"), PassRole::Geometry, entries, 0),
+            locks: graph.clear_buffer(&format!("{technique}/clear locks"), PassRole::Geometry, locks, 0),
             buckets,
         }
     }
@@ -251,8 +259,10 @@ fn record_cached(
     let wide = is_wide(frame, info);
     let name = |part: &str| format!("{}/{part}", info.id);
     let references = name(if wide { "wide references" } else { "references" });
-    let references = graph.image(&references, frame.multisampled_info(vk::Format::R8G8B8A8_UNORM));
-    let depth = graph.image(&name("depth"), frame.multisampled_info(vk::Format::D32_SFLOAT));
+    let references =
+        graph.image(&references, BufferRole::Visibility, frame.multisampled_info(vk::Format::R8G8B8A8_UNORM));
+    let depth =
+        graph.image(&name("depth"), BufferRole::Depth, frame.multisampled_info(vk::Format::D32_SFLOAT));
     let cache = Cache::new(graph, frame, info);
     let list = triangle_buffer::List::new(graph, frame, info.id, REFERENCES_MAX)?;
     let tags = if wide { &["wide"][..] } else { &[] };
@@ -260,9 +270,9 @@ fn record_cached(
     let mut fill = FillPass::new(graph, frame, info, "dais/fill.frag", tags)?;
     fill.surfaces.constants = cache.constants(&list);
 
-    let depth = depth_only.fill_depth(graph, frame, &name("depth"), depth);
+    let depth = depth_only.fill_depth(graph, frame, (&name("depth"), PassRole::DepthPrepass), depth);
 
-    let mut pass = graph.raster(&name("fill"));
+    let mut pass = graph.raster(&name("fill"), PassRole::Geometry);
     frame.bind_scene(&mut pass);
     let references = pass.color(references, Load::Clear(NO_TRIANGLE_RGBA8));
     pass.depth_read_only(&depth);

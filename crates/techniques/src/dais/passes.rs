@@ -1,6 +1,6 @@
 //! The two passes over the scene of techniques whose fragments store their triangles (Schied and Dachsbacher 2015, Figure 3).
 
-use afterlight_graph::{BufferHandle, DepthTest, Graph, RasterPass};
+use afterlight_graph::{BufferHandle, BufferRole, DepthTest, Graph, PassRole, RasterPass};
 
 use crate::{Info, error::TechniqueError, frame::Frame, geometry::Surfaces};
 
@@ -47,8 +47,13 @@ impl FillPass {
             return Ok(Self { surfaces: fill.depth(DepthTest::EQUAL), numbers: None });
         }
         let fill = Surfaces::shaded(frame, &opaque, &masked)?.whole_triangles(frame, info.id)?;
-        let numbers = graph.buffer(&format!("{}/triangle numbers", info.id), 4);
-        let numbers = graph.clear_buffer(&format!("{}/clear triangle numbers", info.id), numbers, 0);
+        let numbers = graph.buffer(&format!("{}/triangle numbers", info.id), BufferRole::Counters, 4);
+        let numbers = graph.clear_buffer(
+            &format!("{}/clear triangle numbers", info.id),
+            PassRole::Geometry,
+            numbers,
+            0,
+        );
         Ok(Self { surfaces: fill.depth(DepthTest::EQUAL), numbers: Some(numbers) })
     }
 

@@ -2,7 +2,7 @@
 
 // ORDER: 150
 
-use afterlight_graph::{BufferHandle, Graph, ImageHandle, ImageInfo, Load, RasterPass};
+use afterlight_graph::{BufferHandle, BufferRole, Graph, ImageHandle, ImageInfo, Load, PassRole, RasterPass};
 
 use crate::{
     Answers, Exactness, Frame, Info, MULTIPLE_SAMPLES, Need, ParamInfo, ParamKind, Params, Source, Technique,
@@ -82,7 +82,7 @@ impl Technique for DaisList {
         let rows = band_rows(frame);
         // Held for one band: the next one draws over it.
         let info = ImageInfo::new(frame.small_depth_stencil_format(), frame.width_px, rows);
-        let mut depth = graph.image("dais-list/depth", info.samples(frame.samples));
+        let mut depth = graph.image("dais-list/depth", BufferRole::Depth, info.samples(frame.samples));
         for (first_row, number) in (0..frame.height_px).step_by(rows as usize).zip(1..) {
             let band = Band { number, first_row };
             depth = band.draw_depth(graph, frame, depth)?;
@@ -119,18 +119,23 @@ impl Lists {
         let fixed: Option<u32> = frame.params.text(&INFO, NODES.key).parse().ok();
         let capacity = fixed.unwrap_or_else(|| frame.capacity("nodes", FIRST_GUESS));
         frame.check_binding(INFO.id, "nodes", 8 * u64::from(capacity))?;
-        let zeroed = |graph: &mut Graph, name: &str, bytes: u64| {
-            let buffer = graph.buffer(&format!("dais-list/{name}"), bytes);
-            graph.clear_buffer(&format!("dais-list/clear {name}"), buffer, 0)
+        let zeroed = |graph: &mut Graph, name: &str, role: BufferRole, bytes: u64| {
+            let buffer = graph.buffer(&format!("dais-list/{name}"), role, bytes);
+            graph.clear_buffer(&format!("dais-list/clear {name}"), PassRole::Geometry, buffer, 0)
         };
         Ok(Self {
-            heads: zeroed(graph, "heads", 4 * pixels),
-            nodes: graph.buffer("dais-list/nodes", 8 * u64::from(capacity.max(1))),
-            node_count: zeroed(graph, "node count", 8),
+            heads: zeroed(graph, "heads", BufferRole::SurfaceListHeads, 4 * pixels),
+            nodes: graph.buffer(
+                "dais-list/nodes",
+                BufferRole::SurfaceListNodes,
+                8 * u64::from(capacity.max(1)),
+            ),
+            node_count: zeroed(graph, "node count", BufferRole::SurfaceListNodes, 8),
             // Nobody asks what was dropped where nothing can be.
             drops: zeroed(
                 graph,
                 "sample drops",
+                BufferRole::SurfaceListNodes,
                 if fixed.is_some() { pixels.next_multiple_of(4) } else { 4 },
             ),
             claims: gbuffer_list::claims(graph, frame, INFO.id, frame.samples),
@@ -270,7 +275,7 @@ impl Band {
         depth: ImageHandle,
     ) -> Result<ImageHandle, TechniqueError> {
         let surfaces = dais::depth_surfaces(frame)?;
-        let mut pass = graph.raster(&self.pass_name("depth"));
+        let mut pass = graph.raster(&self.pass_name("depth"), PassRole::DepthPrepass);
         frame.bind_scene(&mut pass);
         let depth = pass.depth(depth, Load::Clear(0.0));
         pass.stencil_clear(0).viewport(self.viewport(frame));
@@ -300,7 +305,7 @@ impl Band {
         }
         surfaces.push = self.first_row.to_le_bytes().to_vec();
 
-        let mut pass = graph.raster(&self.pass_name("fill"));
+        let mut pass = graph.raster(&self.pass_name("fill"), PassRole::Geometry);
         frame.bind_scene(&mut pass);
         let depth = pass.stencil(depth, Load::Keep);
         pass.viewport(self.viewport(frame));

@@ -2,7 +2,7 @@
 
 // ORDER: 40
 
-use afterlight_graph::{Graph, ImageHandle, Load, gpu::vk};
+use afterlight_graph::{Graph, ImageHandle, Load, PassRole, gpu::vk};
 
 use crate::{
     Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError,
@@ -71,7 +71,7 @@ impl Technique for Deferred {
                 return gbuffer::shade(graph, frame, INFO.id, filled, &step);
             }
         }
-        let mut pass = graph.raster("deferred/lights");
+        let mut pass = graph.raster("deferred/lights", PassRole::Shading);
         frame.bind_scene(&mut pass);
         gbuffer::bind(&mut pass, &filled);
         filled.accumulation = pass.color(filled.accumulation, Load::Keep);

@@ -3,7 +3,9 @@
 
 // ORDER: 110
 
-use afterlight_graph::{DepthTest, Graph, ImageHandle, Load, StencilFace, StencilTest, gpu::vk};
+use afterlight_graph::{
+    BufferRole, DepthTest, Graph, ImageHandle, Load, PassRole, StencilFace, StencilTest, gpu::vk,
+};
 
 use crate::{
     Answers, AppendixA, Exactness, Frame, Info, MULTIPLE_SAMPLES, Params, Source, Technique, TechniqueError,
@@ -89,8 +91,16 @@ fn shade_by_stencil(
     frame: &Frame<'_>,
     filled: &SampleBuffer,
 ) -> Result<ImageHandle, TechniqueError> {
-    let stencil = graph.image("deferred-msaa/stencil", frame.image_info(frame.depth_stencil_format()));
-    let radiance = graph.image("deferred-msaa/radiance", frame.image_info(vk::Format::R16G16B16A16_SFLOAT));
+    let stencil = graph.image(
+        "deferred-msaa/stencil",
+        BufferRole::Depth,
+        frame.image_info(frame.depth_stencil_format()),
+    );
+    let radiance = graph.image(
+        "deferred-msaa/radiance",
+        BufferRole::Targets,
+        frame.image_info(vk::Format::R16G16B16A16_SFLOAT),
+    );
     let samples = [("SAMPLES", frame.samples)];
     let mark = multisample::full_screen(frame, "multisample/mark.frag", &samples)?.stencil(MARK);
     let shaded = |rate: &str| {
@@ -101,7 +111,7 @@ fn shade_by_stencil(
     };
     let (at_pixels, at_samples) = (shaded("pixel")?, shaded("sample")?);
 
-    let mut pass = graph.raster("deferred-msaa/edges");
+    let mut pass = graph.raster("deferred-msaa/edges", PassRole::Resolve);
     frame.bind_scene(&mut pass);
     filled.bind(&mut pass);
     // Its depth is not used, but attached.
@@ -110,7 +120,7 @@ fn shade_by_stencil(
     multisample::draw_full_screen(&mut pass, mark, 1);
     pass.finish();
 
-    let mut pass = graph.raster("deferred-msaa/shade");
+    let mut pass = graph.raster("deferred-msaa/shade", PassRole::Shading);
     frame.bind_scene(&mut pass);
     filled.bind(&mut pass);
     // The two draws cover every pixel.

@@ -2,7 +2,9 @@
 
 // ORDER: 50
 
-use afterlight_graph::{Blend, DepthTest, Graph, ImageHandle, Load, StencilFace, StencilTest, gpu::vk};
+use afterlight_graph::{
+    Blend, DepthTest, Graph, ImageHandle, Load, PassRole, StencilFace, StencilTest, gpu::vk,
+};
 
 use crate::{
     Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError,
@@ -101,7 +103,7 @@ impl Technique for DeferredStencil {
         )?
         .stencil(MARKED);
 
-        let mut pass = graph.raster("deferred-stencil/lights");
+        let mut pass = graph.raster("deferred-stencil/lights", PassRole::Shading);
         frame.bind_scene(&mut pass);
         gbuffer::bind(&mut pass, &filled);
         let accumulation = pass.color(filled.accumulation, Load::Keep);

@@ -2,7 +2,9 @@
 
 // ORDER: 30
 
-use afterlight_graph::{DepthTest, Graph, ImageHandle, Load, RasterPass, StencilFace, StencilTest, gpu::vk};
+use afterlight_graph::{
+    BufferRole, DepthTest, Graph, ImageHandle, Load, PassRole, RasterPass, StencilFace, StencilTest, gpu::vk,
+};
 
 use crate::{
     ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError,
@@ -69,8 +71,9 @@ pub(crate) fn draw_depth(
     technique: &str,
 ) -> Result<ImageHandle, TechniqueError> {
     let name = format!("{technique}/depth");
-    let depth = graph.image(&name, frame.multisampled_info(vk::Format::D32_SFLOAT_S8_UINT));
-    Ok(Surfaces::depth_only(frame)?.fill_depth(graph, frame, &name, depth))
+    let depth =
+        graph.image(&name, BufferRole::Depth, frame.multisampled_info(vk::Format::D32_SFLOAT_S8_UINT));
+    Ok(Surfaces::depth_only(frame)?.fill_depth(graph, frame, (&name, PassRole::DepthPrepass), depth))
 }
 
 /// Declares the pass `technique/shade`: surfaces where `depth`, of [`draw_depth`], is equal, each shaded by `shader`, which ends in
@@ -92,7 +95,7 @@ pub(crate) fn shade_visible(
         .depth(DepthTest::EQUAL)
         .stencil(FIRST_FRAGMENT, 1);
     shaded.constants = constants;
-    let mut pass = graph.raster(&format!("{technique}/shade"));
+    let mut pass = graph.raster(&format!("{technique}/shade"), PassRole::Shading);
     frame.bind_scene(&mut pass);
     bind_lights(&mut pass);
     let radiance = target.attach(frame, &mut pass);
@@ -118,7 +121,7 @@ impl Technique for DepthPrepass {
         let mut count = frame.shows(INVOCATIONS).then(|| InvocationCount::new(graph, frame, "depth-prepass"));
 
         let depth = draw_depth(graph, frame, INFO.id)?;
-        let mut pass = graph.raster("depth-prepass/shade");
+        let mut pass = graph.raster("depth-prepass/shade", PassRole::Shading);
         frame.bind_scene(&mut pass);
         count = count.map(|count| count.bind(&mut pass));
         let radiance = target.attach(frame, &mut pass);

@@ -2,7 +2,7 @@
 
 // ORDER: 10
 
-use afterlight_graph::{Graph, ImageHandle, Load, gpu::vk};
+use afterlight_graph::{BufferRole, Graph, ImageHandle, Load, PassRole, gpu::vk};
 
 use crate::{
     ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError,
@@ -57,11 +57,12 @@ impl Technique for Forward {
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let target = RadianceTarget::new(graph, frame, "forward");
-        let depth = graph.image("forward/depth", frame.multisampled_info(vk::Format::D32_SFLOAT));
+        let depth =
+            graph.image("forward/depth", BufferRole::Depth, frame.multisampled_info(vk::Format::D32_SFLOAT));
         let surfaces = shaded_surfaces(frame)?;
         let mut count = frame.shows(INVOCATIONS).then(|| InvocationCount::new(graph, frame, "forward"));
 
-        let mut pass = graph.raster("forward/shade");
+        let mut pass = graph.raster("forward/shade", PassRole::Shading);
         frame.bind_scene(&mut pass);
         count = count.map(|count| count.bind(&mut pass));
         let radiance = target.attach(frame, &mut pass);

@@ -2,7 +2,9 @@
 
 // ORDER: 20
 
-use afterlight_graph::{Blend, DepthTest, Graph, ImageHandle, Load, RasterPass, Rect, gpu::vk};
+use afterlight_graph::{
+    Blend, BufferRole, DepthTest, Graph, ImageHandle, Load, PassRole, RasterPass, Rect, gpu::vk,
+};
 use afterlight_scene::Aabb;
 use glam::{Mat4, Vec3};
 
@@ -68,16 +70,23 @@ impl Technique for ForwardMultipass {
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
-        let radiance =
-            graph.image("forward-multipass/radiance", frame.image_info(vk::Format::R16G16B16A16_SFLOAT));
-        let depth = graph.image("forward-multipass/depth", frame.image_info(vk::Format::D32_SFLOAT_S8_UINT));
+        let radiance = graph.image(
+            "forward-multipass/radiance",
+            BufferRole::Targets,
+            frame.image_info(vk::Format::R16G16B16A16_SFLOAT),
+        );
+        let depth = graph.image(
+            "forward-multipass/depth",
+            BufferRole::Depth,
+            frame.image_info(vk::Format::D32_SFLOAT_S8_UINT),
+        );
         let ambient = Surfaces::shaded(
             frame,
             "forward_multipass/light.frag#ambient",
             "forward_multipass/light.frag#ambient-mask",
         )?;
 
-        let mut pass = graph.raster("forward-multipass/ambient");
+        let mut pass = graph.raster("forward-multipass/ambient", PassRole::Shading);
         frame.bind_scene(&mut pass);
         let radiance = pass.color(radiance, Load::Clear(frame.background()));
         let depth = pass.depth(depth, Load::Clear(0.0));
@@ -85,7 +94,7 @@ impl Technique for ForwardMultipass {
         ambient.draw(frame, &mut pass);
         pass.finish();
 
-        let mut pass = graph.raster("forward-multipass/lights");
+        let mut pass = graph.raster("forward-multipass/lights", PassRole::Shading);
         frame.bind_scene(&mut pass);
         let radiance = pass.color(radiance, Load::Keep);
         let depth = pass.stencil(depth, Load::Keep);

@@ -10,7 +10,7 @@
 //!
 //! 21 bytes a pixel, 8 of them the accumulation (Petrescu et al. 2016, Figure 1).
 
-use afterlight_graph::{ComputePass, Graph, ImageHandle, Load, RasterPass, gpu::vk};
+use afterlight_graph::{BufferRole, ComputePass, Graph, ImageHandle, Load, PassRole, RasterPass, gpu::vk};
 
 use crate::{
     error::TechniqueError,
@@ -55,16 +55,16 @@ pub(crate) fn fill_by(
     depth_format: vk::Format,
     draw: impl FnOnce(&mut RasterPass<'_>),
 ) -> GBuffer {
-    let image = |graph: &mut Graph, name: &str, format| {
-        graph.image(&format!("{technique}/{name}"), frame.image_info(format))
+    let image = |graph: &mut Graph, name: &str, role, format| {
+        graph.image(&format!("{technique}/{name}"), role, frame.image_info(format))
     };
-    let accumulation = image(graph, "accumulation", vk::Format::R16G16B16A16_SFLOAT);
-    let base_color = image(graph, "base color", vk::Format::R8G8B8A8_SRGB);
-    let normal = image(graph, "normal", vk::Format::R16G16_UNORM);
-    let roughness = image(graph, "roughness", vk::Format::R8_UNORM);
-    let depth = image(graph, "depth", depth_format);
+    let accumulation = image(graph, "accumulation", BufferRole::Targets, vk::Format::R16G16B16A16_SFLOAT);
+    let base_color = image(graph, "base color", BufferRole::Surfaces, vk::Format::R8G8B8A8_SRGB);
+    let normal = image(graph, "normal", BufferRole::Surfaces, vk::Format::R16G16_UNORM);
+    let roughness = image(graph, "roughness", BufferRole::Surfaces, vk::Format::R8_UNORM);
+    let depth = image(graph, "depth", BufferRole::Depth, depth_format);
 
-    let mut pass = graph.raster(&format!("{technique}/gbuffer"));
+    let mut pass = graph.raster(&format!("{technique}/gbuffer"), PassRole::Geometry);
     frame.bind_scene(&mut pass);
     let filled = GBuffer {
         accumulation: pass.color(accumulation, Load::Clear(frame.background())),
@@ -117,7 +117,8 @@ pub(crate) fn shade_by(
     filled: GBuffer,
     bind_lights: impl FnOnce(&mut ComputePass<'_>),
 ) -> Result<ImageHandle, TechniqueError> {
-    let mut pass = frame.compute(graph, &format!("{technique}/shade"), &frame.shader(shader)?);
+    let mut pass =
+        frame.compute(graph, &format!("{technique}/shade"), PassRole::Shading, &frame.shader(shader)?);
     bind(&mut pass, &filled);
     bind_lights(&mut pass);
     let radiance = pass.write("hdr", filled.accumulation);

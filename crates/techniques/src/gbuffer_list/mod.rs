@@ -5,7 +5,8 @@
 mod filter;
 
 use afterlight_graph::{
-    BufferHandle, DepthTest, Graph, ImageHandle, Load, StencilFace, StencilTest, gpu::vk,
+    BufferHandle, BufferRole, DepthTest, Graph, ImageHandle, Load, PassRole, StencilFace, StencilTest,
+    gpu::vk,
 };
 
 use crate::{
@@ -258,13 +259,17 @@ fn empty_lists(
     frame: &Frame<'_>,
     layout: &Layout,
 ) -> Result<(BufferHandle, BufferHandle, BufferHandle), TechniqueError> {
-    let blocks = graph.buffer("gbuffer-list/blocks", layout.bytes(frame)?);
-    let count = graph.buffer("gbuffer-list/block count", 8);
+    let blocks = graph.buffer("gbuffer-list/blocks", BufferRole::SurfaceListNodes, layout.bytes(frame)?);
+    let count = graph.buffer("gbuffer-list/block count", BufferRole::SurfaceListNodes, 8);
     let objects = frame.params.text(&INFO, filter::OBJECTS.key);
-    let flagged =
-        frame.table(graph, "gbuffer-list/flagged draws", &filter::flagged_draws(frame.scene, objects))?;
-    let blocks = graph.clear_buffer("gbuffer-list/clear blocks", blocks, 0);
-    let count = graph.clear_buffer("gbuffer-list/clear count", count, 0);
+    let flagged = frame.table(
+        graph,
+        "gbuffer-list/flagged draws",
+        BufferRole::Scene,
+        &filter::flagged_draws(frame.scene, objects),
+    )?;
+    let blocks = graph.clear_buffer("gbuffer-list/clear blocks", PassRole::Geometry, blocks, 0);
+    let count = graph.clear_buffer("gbuffer-list/clear count", PassRole::Geometry, count, 0);
     Ok((blocks, count, flagged))
 }
 
@@ -279,8 +284,12 @@ pub(crate) fn claims(
     frame.scene.has_masked().then(|| {
         let bits = if samples > 8 { 16 } else { 8 };
         let pixels = u64::from(frame.width_px) * u64::from(frame.height_px);
-        let claims = graph.buffer(&format!("{technique}/claims"), 4 * (pixels * bits).div_ceil(32));
-        graph.clear_buffer(&format!("{technique}/clear claims"), claims, 0)
+        let claims = graph.buffer(
+            &format!("{technique}/claims"),
+            BufferRole::Claims,
+            4 * (pixels * bits).div_ceil(32),
+        );
+        graph.clear_buffer(&format!("{technique}/clear claims"), PassRole::Geometry, claims, 0)
     })
 }
 
@@ -298,7 +307,7 @@ fn fill_by_compute(graph: &mut Graph, frame: &Frame<'_>, layout: &Layout) -> Res
     let visible = Visible::find(graph, frame, &INFO, layout.samples)?;
     let (blocks, count, flagged) = empty_lists(graph, frame, layout)?;
     let shader = frame.shader(&format!("gbuffer_list/fill.comp{}", visible.tag('#')))?;
-    let mut pass = frame.compute(graph, "gbuffer-list/fill", &shader);
+    let mut pass = frame.compute(graph, "gbuffer-list/fill", PassRole::Geometry, &shader);
     for (name, value) in build_constants(frame, layout) {
         pass.constant(&name, value);
     }
@@ -330,8 +339,11 @@ fn fill_by_raster(graph: &mut Graph, frame: &Frame<'_>, layout: &Layout) -> Resu
             expected: "filter=depth-edges, or fill=compute".to_owned(),
         });
     }
-    let depth =
-        graph.image("gbuffer-list/depth", frame.multisampled_info(frame.small_depth_stencil_format()));
+    let depth = graph.image(
+        "gbuffer-list/depth",
+        BufferRole::Depth,
+        frame.multisampled_info(frame.small_depth_stencil_format()),
+    );
     let depth_only = Surfaces::depth_only(frame)?;
     let (opaque, masked) = match layout.samples {
         1 => ("gbuffer_list/fill.frag#one", "gbuffer_list/fill.frag#one-mask"),
@@ -347,9 +359,9 @@ fn fill_by_raster(graph: &mut Graph, frame: &Frame<'_>, layout: &Layout) -> Resu
     let (blocks, count, flagged) = empty_lists(graph, frame, layout)?;
     let claims = claims(graph, frame, INFO.id, layout.samples);
 
-    let depth = depth_only.fill_depth(graph, frame, "gbuffer-list/depth", depth);
+    let depth = depth_only.fill_depth(graph, frame, ("gbuffer-list/depth", PassRole::DepthPrepass), depth);
 
-    let mut pass = graph.raster("gbuffer-list/fill");
+    let mut pass = graph.raster("gbuffer-list/fill", PassRole::Geometry);
     frame.bind_scene(&mut pass);
     pass.read("gbuffer_depth", &depth).read("SingleSampleDraws", &flagged);
     let blocks = pass.write("Blocks", blocks);

@@ -7,8 +7,8 @@
 use std::ops::Range;
 
 use afterlight_graph::{
-    Blend, BufferHandle, DepthTest, Draw, DrawCall, Graph, ImageHandle, Load, RasterPass, RasterState, Rect,
-    StencilTest, gpu::vk,
+    Blend, BufferHandle, DepthTest, Draw, DrawCall, Graph, ImageHandle, Load, PassRole, RasterPass,
+    RasterState, Rect, StencilTest, gpu::vk,
 };
 use afterlight_graph::{VertexAttribute, VertexLayout, VertexStream};
 use afterlight_shader::Shader;
@@ -227,15 +227,16 @@ impl Surfaces {
         pass.draw(self.bucket_draw(frame, bucket, call));
     }
 
-    /// Declares the pass `name` that clears a depth image, and its stencil where it has one, and draws the surfaces into it.
+    /// Declares the pass `name` that clears a depth image, and its stencil where it has one, and draws the surfaces into it: for a
+    /// depth pre-pass, or for what its role says.
     pub(crate) fn fill_depth(
         &self,
         graph: &mut Graph,
         frame: &Frame<'_>,
-        name: &str,
+        (name, role): (&str, PassRole),
         depth: ImageHandle,
     ) -> ImageHandle {
-        let mut pass = graph.raster(name);
+        let mut pass = graph.raster(name, role);
         frame.bind_scene(&mut pass);
         let depth = pass.depth(depth, Load::Clear(0.0));
         if has_stencil(depth.info().format) {

@@ -3,7 +3,8 @@
 // ORDER: 56
 
 use afterlight_graph::{
-    Blend, BufferHandle, DepthTest, Graph, ImageHandle, Load, RasterPass, StencilFace, StencilTest, gpu::vk,
+    Blend, BufferHandle, BufferRole, DepthTest, Graph, ImageHandle, Load, PassRole, RasterPass, StencilFace,
+    StencilTest, gpu::vk,
 };
 
 use crate::{
@@ -147,7 +148,7 @@ impl Technique for Hybrid {
             _ => paths::predicted(frame, frame.params.number(&INFO, PREPASS_WEIGHT.key)),
         };
         let lengths: Vec<u32> = runs.iter().map(|run| run.places.len() as u32).collect();
-        let counts = frame.table(graph, "hybrid draw counts", &lengths)?;
+        let counts = frame.table(graph, "hybrid draw counts", BufferRole::Scene, &lengths)?;
         let draws = Draws { runs, counts };
         let filled = fill(graph, frame, &draws)?;
         let surfaces = [&filled.depth, &filled.normal, &filled.roughness];
@@ -184,7 +185,7 @@ fn apply_materials(
     let again = Surfaces::shaded(frame, "light_prepass/material.frag", "light_prepass/material.frag#mask")?
         .depth(DepthTest::EQUAL)
         .stencil(FIRST_FRAGMENT, COLORED);
-    let mut pass = graph.raster("hybrid/materials");
+    let mut pass = graph.raster("hybrid/materials", PassRole::Shading);
     frame.bind_scene(&mut pass);
     for (slot, sum) in SUMS.iter().zip(sums) {
         pass.read(slot, sum);

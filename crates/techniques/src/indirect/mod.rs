@@ -5,7 +5,7 @@
 
 use std::f32::consts::{PI, TAU};
 
-use afterlight_graph::{BufferHandle, Graph, ImageHandle, ImageInfo, Load, gpu::vk};
+use afterlight_graph::{BufferHandle, BufferRole, Graph, ImageHandle, ImageInfo, Load, PassRole, gpu::vk};
 use afterlight_shader::structs::RsmConstants;
 
 use crate::{SceneGpu, Settings, error::TechniqueError, frame::Frame, geometry::Surfaces, light_view};
@@ -108,7 +108,7 @@ pub(crate) fn record(
         }
     };
     let buffer = light_view::upload(frame.device, "shared/rsm constants", &constants)?;
-    let constants = graph.import_buffer("shared/rsm constants", &buffer);
+    let constants = graph.import_buffer("shared/rsm constants", BufferRole::Constants, &buffer);
     frame.buffers.rsm = Some(Rsm { constants, images });
     Ok(())
 }
@@ -121,14 +121,18 @@ fn raster(
     light_index: u32,
 ) -> Result<RsmImages, TechniqueError> {
     let image = |graph: &mut Graph, name: &str, format| {
-        graph.image(&format!("shared/rsm {name}"), ImageInfo::new(format, size_px, size_px))
+        graph.image(
+            &format!("shared/rsm {name}"),
+            BufferRole::Shared,
+            ImageInfo::new(format, size_px, size_px),
+        )
     };
     let surface = image(graph, "surface", vk::Format::R32G32B32A32_UINT);
     let flux = image(graph, "flux", vk::Format::R16G16B16A16_SFLOAT);
     let depth = image(graph, "depth", vk::Format::D32_SFLOAT);
     let mut surfaces = Surfaces::shaded(frame, "indirect/rsm.frag", "indirect/rsm.frag#mask")?;
     surfaces.push = light_index.to_le_bytes().to_vec();
-    let mut pass = graph.raster("shared/rsm");
+    let mut pass = graph.raster("shared/rsm", PassRole::Shared);
     frame.bind_scene(&mut pass);
     // A texel without flux gives nothing, wherever it is.
     let images = RsmImages {

@@ -2,7 +2,7 @@
 //! section 3.4). Whoever looks for the lights of a place or of a part of the view walks down from the top, so that the time grows with
 //! what is found, not with the number of lights.
 
-use afterlight_graph::{Graph, ImageHandle, ImageInfo, gpu::vk};
+use afterlight_graph::{BufferRole, Graph, ImageHandle, ImageInfo, PassRole, gpu::vk};
 
 use crate::{
     error::TechniqueError,
@@ -37,6 +37,19 @@ fn level_counts(lights: u32) -> Vec<u32> {
 /// # Errors
 /// A shader that is not compiled in.
 pub fn build(graph: &mut Graph, frame: &Frame<'_>, technique: &str) -> Result<LightBvh, TechniqueError> {
+    build_for(graph, frame, technique, (PassRole::LightAssignment, BufferRole::Lights))
+}
+
+/// The same with roles of passes and boxes: work that techniques share has its own.
+///
+/// # Errors
+/// A shader that is not compiled in.
+pub(crate) fn build_for(
+    graph: &mut Graph,
+    frame: &Frame<'_>,
+    technique: &str,
+    (pass_role, buffer_role): (PassRole, BufferRole),
+) -> Result<LightBvh, TechniqueError> {
     let counts = level_counts(frame.lights.bounded_count());
     if counts.is_empty() {
         return Ok(LightBvh { boxes: None });
@@ -44,9 +57,9 @@ pub fn build(graph: &mut Graph, frame: &Frame<'_>, technique: &str) -> Result<Li
     let shader = frame.shader("light_bvh/boxes.comp")?;
     let nodes: u32 = counts.iter().sum();
     let info = ImageInfo::new(vk::Format::R32G32B32A32_SFLOAT, ROW_TEXELS, (2 * nodes).div_ceil(ROW_TEXELS));
-    let mut boxes = graph.image(&format!("{technique}/light boxes"), info);
+    let mut boxes = graph.image(&format!("{technique}/light boxes"), buffer_role, info);
     for (level, count) in (1u32..).zip(counts) {
-        let mut pass = frame.compute(graph, &format!("{technique}/light boxes {level}"), &shader);
+        let mut pass = frame.compute(graph, &format!("{technique}/light boxes {level}"), pass_role, &shader);
         pass.constant("LEVEL", level);
         boxes = pass.write("boxes", boxes);
         pass.dispatch([count.min(GROUPS_A_ROW), count.div_ceil(GROUPS_A_ROW), 1]);

@@ -1,7 +1,7 @@
 //! The indices of the four nearest lights, packed into every pixel by blending, for `light-indexed` and `light-indexed-forward`:
 //! see the README of this folder.
 
-use afterlight_graph::{Blend, BlendEquation, Graph, ImageHandle, Load, gpu::vk};
+use afterlight_graph::{Blend, BlendEquation, BufferRole, Graph, ImageHandle, Load, PassRole, gpu::vk};
 use glam::Mat4;
 
 use crate::{
@@ -95,12 +95,17 @@ pub fn build(
     })?;
     let image = |i| {
         let name = format!("{}/light indices {i}", info.id);
-        graph.image(&name, frame.image_info(vk::Format::R16G16B16A16_SFLOAT))
+        graph.image(&name, BufferRole::Lights, frame.image_info(vk::Format::R16G16B16A16_SFLOAT))
     };
     let cleared: Vec<ImageHandle> = (0..count).map(image).collect();
-    let order = frame.table(graph, "light order", &far_to_near(frame.lights, frame.clip_from_world))?;
+    let order = frame.table(
+        graph,
+        "light order",
+        BufferRole::Lights,
+        &far_to_near(frame.lights, frame.clip_from_world),
+    )?;
 
-    let mut pass = graph.raster(&format!("{}/indices", info.id));
+    let mut pass = graph.raster(&format!("{}/indices", info.id), PassRole::LightAssignment);
     frame.bind_scene(&mut pass);
     pass.read("surface_depth", depth).read("LightOrder", &order);
     let images = cleared.into_iter().map(|image| pass.color(image, Load::Clear([0.0; 4]))).collect();

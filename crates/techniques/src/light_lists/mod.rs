@@ -1,6 +1,6 @@
 //! Lists of lights, one a pixel, for `light-list` and `light-list-forward`: see the README of this folder.
 
-use afterlight_graph::{BufferHandle, DepthTest, Graph, ImageHandle, gpu::vk};
+use afterlight_graph::{BufferHandle, BufferRole, DepthTest, Graph, ImageHandle, PassRole, gpu::vk};
 
 use crate::{
     Frame, ParamInfo, ParamKind, TechniqueError,
@@ -52,9 +52,15 @@ pub fn build(
     frame.check_binding(info.id, "light nodes", 8 * u64::from(capacity))?;
     let tree = light_bvh::build(graph, frame, info.id)?;
     let mut heads = empty_heads(graph, frame, info.id, surfaces)?;
-    let count = graph.buffer(&format!("{}/light node count", info.id), 8);
-    let mut count = graph.clear_buffer(&format!("{}/clear light node count", info.id), count, 0);
-    let mut nodes = graph.buffer(&format!("{}/light nodes", info.id), 8 * u64::from(capacity.max(1)));
+    let count = graph.buffer(&format!("{}/light node count", info.id), BufferRole::Lights, 8);
+    let mut count = graph.clear_buffer(
+        &format!("{}/clear light node count", info.id),
+        PassRole::LightAssignment,
+        count,
+        0,
+    );
+    let mut nodes =
+        graph.buffer(&format!("{}/light nodes", info.id), BufferRole::Lights, 8 * u64::from(capacity.max(1)));
 
     let bounded = frame.lights.bounded_count();
     if bounded > 0 {
@@ -66,7 +72,7 @@ pub fn build(
             .depth(test)
             .constant("NODE_CAPACITY", capacity)
             .constant("SAMPLED", u32::from(surfaces.samples() > 1));
-        let mut pass = graph.raster(&format!("{}/lists", info.id));
+        let mut pass = graph.raster(&format!("{}/lists", info.id), PassRole::LightAssignment);
         frame.bind_scene(&mut pass);
         heads = pass.write("LightHeads", heads);
         nodes = pass.write("LightNodes", nodes);
@@ -81,7 +87,12 @@ pub fn build(
         pass.draw(volumes::volume_draw(frame, state, frame.lights.unbounded_count, bounded));
         pass.finish();
     } else {
-        nodes = graph.clear_buffer(&format!("{}/clear light nodes", info.id), nodes, 0);
+        nodes = graph.clear_buffer(
+            &format!("{}/clear light nodes", info.id),
+            PassRole::LightAssignment,
+            nodes,
+            0,
+        );
     }
     frame.watch(graph, COUNTER, &count, capacity, fixed.is_some());
     Ok(LightLists { heads, nodes, tree, sampled: surfaces.samples() > 1 })
@@ -96,9 +107,9 @@ fn empty_heads(
 ) -> Result<BufferHandle, TechniqueError> {
     let bytes = 12 * u64::from(frame.width_px) * u64::from(frame.height_px);
     frame.check_binding(technique, "light heads", bytes)?;
-    let heads = graph.buffer(&format!("{technique}/light heads"), bytes);
+    let heads = graph.buffer(&format!("{technique}/light heads"), BufferRole::Lights, bytes);
     let shader = frame.shader(&format!("light_lists/heads.comp{}", surfaces.tag()))?;
-    let mut pass = frame.compute(graph, &format!("{technique}/heads"), &shader);
+    let mut pass = frame.compute(graph, &format!("{technique}/heads"), PassRole::LightAssignment, &shader);
     surfaces.bind(&shader, &mut pass);
     let heads = pass.write("LightHeads", heads);
     pass.dispatch(frame.groups(8));

@@ -2,7 +2,7 @@
 
 // ORDER: 55
 
-use afterlight_graph::{DepthTest, Graph, ImageHandle, Load, gpu::vk};
+use afterlight_graph::{BufferRole, DepthTest, Graph, ImageHandle, Load, PassRole, gpu::vk};
 
 use crate::{
     Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError,
@@ -78,11 +78,17 @@ impl Technique for LightPrepass {
 
 /// First pass: depth, and what of a surface the lobes of its BRDF need.
 fn fill(graph: &mut Graph, frame: &Frame<'_>) -> Result<LobeBuffer, TechniqueError> {
-    let normal = graph.image("light-prepass/normal", frame.image_info(vk::Format::R16G16_UNORM));
-    let roughness = graph.image("light-prepass/roughness", frame.image_info(vk::Format::R8_UNORM));
-    let depth = graph.image("light-prepass/depth", frame.image_info(vk::Format::D32_SFLOAT_S8_UINT));
+    let normal =
+        graph.image("light-prepass/normal", BufferRole::Surfaces, frame.image_info(vk::Format::R16G16_UNORM));
+    let roughness =
+        graph.image("light-prepass/roughness", BufferRole::Surfaces, frame.image_info(vk::Format::R8_UNORM));
+    let depth = graph.image(
+        "light-prepass/depth",
+        BufferRole::Depth,
+        frame.image_info(vk::Format::D32_SFLOAT_S8_UINT),
+    );
     let surfaces = Surfaces::shaded(frame, "light_prepass/lobe.frag", "light_prepass/lobe.frag#mask")?;
-    let mut pass = graph.raster("light-prepass/gbuffer");
+    let mut pass = graph.raster("light-prepass/gbuffer", PassRole::Geometry);
     frame.bind_scene(&mut pass);
     let filled = LobeBuffer {
         // Depth 0 tells what holds nothing: the others need no clear.
@@ -105,9 +111,9 @@ pub(crate) fn gather_lights(
 ) -> Result<[ImageHandle; 3], TechniqueError> {
     let sums = SUMS.map(|slot| {
         let name = format!("{technique}/{}", slot.replace('_', " "));
-        graph.image(&name, frame.image_info(vk::Format::R16G16B16A16_SFLOAT))
+        graph.image(&name, BufferRole::Targets, frame.image_info(vk::Format::R16G16B16A16_SFLOAT))
     });
-    let mut pass = graph.raster(&format!("{technique}/lights"));
+    let mut pass = graph.raster(&format!("{technique}/lights"), PassRole::Shading);
     frame.bind_scene(&mut pass);
     pass.read("gbuffer_depth", depth);
     pass.read("gbuffer_normal", normal);
@@ -127,12 +133,16 @@ fn apply_materials(
     depth: ImageHandle,
     sums: &[ImageHandle; 3],
 ) -> Result<ImageHandle, TechniqueError> {
-    let radiance = graph.image("light-prepass/radiance", frame.image_info(vk::Format::R16G16B16A16_SFLOAT));
+    let radiance = graph.image(
+        "light-prepass/radiance",
+        BufferRole::Targets,
+        frame.image_info(vk::Format::R16G16B16A16_SFLOAT),
+    );
     let surfaces =
         Surfaces::shaded(frame, "light_prepass/material.frag", "light_prepass/material.frag#mask")?
             .depth(DepthTest::EQUAL)
             .stencil(FIRST_FRAGMENT, 1);
-    let mut pass = graph.raster("light-prepass/materials");
+    let mut pass = graph.raster("light-prepass/materials", PassRole::Shading);
     frame.bind_scene(&mut pass);
     for (slot, sum) in SUMS.iter().zip(sums) {
         pass.read(slot, sum);

@@ -1,7 +1,7 @@
 //! The stage by which surfaces find their lights, for every technique that shades a surface at once: the parameter `lights`, what it
 //! builds, and what `radiance.glsl` reads of it.
 
-use afterlight_graph::{Graph, ImageHandle};
+use afterlight_graph::{BufferRole, Graph, ImageHandle, PassRole};
 
 use crate::{
     Info, ParamInfo, ParamKind, Params, TechniqueError,
@@ -101,14 +101,20 @@ impl LightStep {
         })
     }
 
-    /// For surfaces wherever they stand, whatever shows of them: a loop where lights are few, else the tree over them.
+    /// For surfaces wherever they stand, whatever shows of them: a loop where lights are few, else the tree over them, whose passes
+    /// and boxes have the roles of the user's work.
     ///
     /// # Errors
     /// A shader that is not compiled in.
-    pub(crate) fn anywhere(graph: &mut Graph, frame: &Frame<'_>, user: &str) -> Result<Self, TechniqueError> {
+    pub(crate) fn anywhere(
+        graph: &mut Graph,
+        frame: &Frame<'_>,
+        user: &str,
+        roles: (PassRole, BufferRole),
+    ) -> Result<Self, TechniqueError> {
         match frame.lights.count <= FEW_LIGHTS {
             true => Ok(Self::All),
-            false => Ok(Self::Tree(light_bvh::build(graph, frame, user)?)),
+            false => Ok(Self::Tree(light_bvh::build_for(graph, frame, user, roles)?)),
         }
     }
 

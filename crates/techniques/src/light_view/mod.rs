@@ -4,7 +4,7 @@
 use std::f32::consts::PI;
 
 use afterlight_graph::{
-    Graph,
+    BufferRole, Graph,
     gpu::{self, vk},
 };
 use afterlight_scene::{Aabb, Camera, Light, LightKind, Projection};
@@ -146,9 +146,9 @@ pub(crate) fn look_through<T>(
     let name = format!("{pass} view");
     let constants = upload(frame.device, &name, &view.constants(&settings, frame.lights, frame.scene))?;
     let imported = [
-        graph.import_buffer(&name, &constants),
-        graph.import_buffer(&format!("{pass} draw commands"), &draws.commands),
-        graph.import_buffer(&format!("{pass} draw counts"), &draws.counts),
+        graph.import_buffer(&name, BufferRole::Constants, &constants),
+        graph.import_buffer(&format!("{pass} draw commands"), BufferRole::Scene, &draws.commands),
+        graph.import_buffer(&format!("{pass} draw counts"), BufferRole::Scene, &draws.counts),
     ];
     let b = &mut frame.buffers;
     let [constants, commands, counts] = imported;

@@ -12,7 +12,7 @@ mod visible;
 
 pub use visible::Visible;
 
-use afterlight_graph::{BufferHandle, Graph, ImageHandle, Load, RasterPass, gpu::vk};
+use afterlight_graph::{BufferHandle, BufferRole, Graph, ImageHandle, Load, PassRole, RasterPass, gpu::vk};
 
 use crate::{
     Info, clusters,
@@ -105,8 +105,13 @@ pub fn fill_dedup(
     let mut count = None;
     if numbered {
         surfaces = surfaces.numbered(frame, technique)?;
-        let buffer = graph.buffer(&format!("{technique}/triangle numbers"), 4);
-        count = Some(graph.clear_buffer(&format!("{technique}/clear triangle numbers"), buffer, 0));
+        let buffer = graph.buffer(&format!("{technique}/triangle numbers"), BufferRole::Counters, 4);
+        count = Some(graph.clear_buffer(
+            &format!("{technique}/clear triangle numbers"),
+            PassRole::Geometry,
+            buffer,
+            0,
+        ));
     }
     let images = [
         ("gbuffer_base_color", vk::Format::R8G8B8A8_SRGB, Load::DontCare),
@@ -132,11 +137,16 @@ fn fill(
     let mut declared = Vec::new();
     for (slot, format, load) in &images {
         let name = format!("{technique}/{}", slot.trim_start_matches("gbuffer_").replace('_', " "));
-        declared.push((*slot, graph.image(&name, frame.multisampled_info(*format)), *load));
+        let role = if *slot == "ids" { BufferRole::Visibility } else { BufferRole::Surfaces };
+        declared.push((*slot, graph.image(&name, role, frame.multisampled_info(*format)), *load));
     }
-    let depth = graph.image(&format!("{technique}/depth"), frame.multisampled_info(vk::Format::D32_SFLOAT));
+    let depth = graph.image(
+        &format!("{technique}/depth"),
+        BufferRole::Depth,
+        frame.multisampled_info(vk::Format::D32_SFLOAT),
+    );
 
-    let mut pass = graph.raster(&format!("{technique}/gbuffer"));
+    let mut pass = graph.raster(&format!("{technique}/gbuffer"), PassRole::Geometry);
     frame.bind_scene(&mut pass);
     if let Some(count) = triangle_count {
         let _count = pass.write("TriangleNumbers", count);
@@ -176,9 +186,12 @@ pub fn shade(
     } else {
         emission_variant(frame, &name)
     })?;
-    let radiance =
-        graph.image(&format!("{technique}/radiance"), frame.image_info(vk::Format::R16G16B16A16_SFLOAT));
-    let mut pass = frame.compute(graph, &format!("{technique}/shade"), &shader);
+    let radiance = graph.image(
+        &format!("{technique}/radiance"),
+        BufferRole::Targets,
+        frame.image_info(vk::Format::R16G16B16A16_SFLOAT),
+    );
+    let mut pass = frame.compute(graph, &format!("{technique}/shade"), PassRole::Shading, &shader);
     for (name, value) in shade_constants(frame, samples) {
         pass.constant(name, value);
     }
@@ -242,7 +255,7 @@ pub(crate) fn add_volumes(
     if view::number(frame.view) > 0 {
         return Ok(radiance);
     }
-    let mut pass = graph.raster(&format!("{technique}/lights"));
+    let mut pass = graph.raster(&format!("{technique}/lights"), PassRole::Shading);
     frame.bind_scene(&mut pass);
     let radiance = pass.color(radiance, Load::Keep);
     let mut bound = VolumePass { pass: &mut pass, constants: Vec::new() };

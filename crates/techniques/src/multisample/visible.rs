@@ -1,7 +1,7 @@
 //! What every sample shows: the pass over the scene, or its rasterisation in compute, that techniques begin with which
 //! fetch triangles by their IDs.
 
-use afterlight_graph::{BufferHandle, Graph, ImageHandle, Load, gpu::vk};
+use afterlight_graph::{BufferHandle, BufferRole, Graph, ImageHandle, Load, PassRole, gpu::vk};
 
 use super::NO_TRIANGLE_RGBA8;
 use crate::{
@@ -49,14 +49,14 @@ impl Visible {
         }
         let name = |part: &str| format!("{}/{part}", info.id);
         let image = |format| frame.image_info(format).samples(samples);
-        let ids = graph.image(&name("ids"), image(vk::Format::R8G8B8A8_UNORM));
-        let depth = graph.image(&name("depth"), image(vk::Format::D32_SFLOAT));
+        let ids = graph.image(&name("ids"), BufferRole::Visibility, image(vk::Format::R8G8B8A8_UNORM));
+        let depth = graph.image(&name("depth"), BufferRole::Depth, image(vk::Format::D32_SFLOAT));
         let surfaces = Surfaces::new(
             frame,
             ("geometry/surface.vert#position", Some("visibility/ids.frag#rgba8")),
             ("geometry/surface.vert#uv", "visibility/ids.frag#rgba8-mask"),
         )?;
-        let mut pass = graph.raster(&name("ids"));
+        let mut pass = graph.raster(&name("ids"), PassRole::Geometry);
         frame.bind_scene(&mut pass);
         let ids = pass.color(ids, Load::Clear(NO_TRIANGLE_RGBA8));
         let depth = pass.depth(depth, Load::Clear(0.0));

@@ -6,7 +6,7 @@
 mod areas;
 
 use afterlight_graph::{
-    Graph, ImageHandle, Load,
+    BufferRole, Graph, ImageHandle, Load, PassRole,
     gpu::{self, SamplerDesc, vk},
 };
 
@@ -62,7 +62,8 @@ pub(crate) fn finish(
         return present::present(graph, frame, hdr);
     }
     let color = present::display(graph, frame, hdr, "post/color")?;
-    let target = graph.image("final color", frame.image_info(vk::Format::R8G8B8A8_UNORM));
+    let target =
+        graph.image("final color", BufferRole::Targets, frame.image_info(vk::Format::R8G8B8A8_UNORM));
     graph.mark_output(&target);
     let shown = Shown { hdr, color: &color };
     match post {
@@ -86,7 +87,7 @@ fn fxaa(
     shown: &Shown<'_>,
     target: ImageHandle,
 ) -> Result<ImageHandle, TechniqueError> {
-    let mut pass = frame.compute(graph, "post/fxaa", &frame.shader("post/fxaa.comp")?);
+    let mut pass = frame.compute(graph, "post/fxaa", PassRole::Filter, &frame.shader("post/fxaa.comp")?);
     pass.read_sampled("color", shown.color, SamplerDesc::LINEAR).read("hdr", shown.hdr);
     let target = pass.write("final_color", target);
     pass.dispatch(frame.groups(8));
@@ -102,25 +103,29 @@ fn smaa(
     target: ImageHandle,
 ) -> Result<ImageHandle, TechniqueError> {
     let (area, search) = smaa_textures(device)?;
-    let area = graph.import_image("post/smaa areas", &area, UPLOADED);
-    let search = graph.import_image("post/smaa search", &search, UPLOADED);
-    let edges = graph.image("post/smaa edges", frame.image_info(vk::Format::R8G8_UNORM));
-    let weights = graph.image("post/smaa weights", frame.image_info(vk::Format::R8G8B8A8_UNORM));
+    let area = graph.import_image("post/smaa areas", BufferRole::Filters, &area, UPLOADED);
+    let search = graph.import_image("post/smaa search", BufferRole::Filters, &search, UPLOADED);
+    let edges = graph.image("post/smaa edges", BufferRole::Filters, frame.image_info(vk::Format::R8G8_UNORM));
+    let weights =
+        graph.image("post/smaa weights", BufferRole::Filters, frame.image_info(vk::Format::R8G8B8A8_UNORM));
 
-    let mut pass = frame.compute(graph, "post/smaa-edges", &frame.shader("post/smaa_edges.comp")?);
+    let mut pass =
+        frame.compute(graph, "post/smaa-edges", PassRole::Filter, &frame.shader("post/smaa_edges.comp")?);
     pass.read("color", shown.color);
     let edges = pass.write("edges", edges);
     pass.dispatch(frame.groups(8));
     pass.finish();
 
-    let mut pass = frame.compute(graph, "post/smaa-weights", &frame.shader("post/smaa_weights.comp")?);
+    let mut pass =
+        frame.compute(graph, "post/smaa-weights", PassRole::Filter, &frame.shader("post/smaa_weights.comp")?);
     pass.read_sampled("edges", &edges, SamplerDesc::LINEAR);
     pass.read_sampled("area", &area, SamplerDesc::LINEAR).read("search", &search);
     let weights = pass.write("weights", weights);
     pass.dispatch(frame.groups(8));
     pass.finish();
 
-    let mut pass = frame.compute(graph, "post/smaa-blend", &frame.shader("post/smaa_blend.comp")?);
+    let mut pass =
+        frame.compute(graph, "post/smaa-blend", PassRole::Filter, &frame.shader("post/smaa_blend.comp")?);
     pass.read("color", shown.color).read("hdr", shown.hdr).read("weights", &weights);
     let target = pass.write("final_color", target);
     pass.dispatch(frame.groups(8));
@@ -174,7 +179,7 @@ fn sraa(
     let (sample_surfaces, sample_depths) = surfaces(graph, frame, "visibility", samples)?;
     let (center_surfaces, center_depths) = surfaces(graph, frame, "centers", 1)?;
 
-    let mut pass = frame.compute(graph, "post/sraa", &frame.shader("post/sraa.comp")?);
+    let mut pass = frame.compute(graph, "post/sraa", PassRole::Filter, &frame.shader("post/sraa.comp")?);
     pass.constant("SAMPLES", samples).read("color", shown.color).read("hdr", shown.hdr);
     pass.read("sample_surfaces", &sample_surfaces).read("sample_depths", &sample_depths);
     pass.read("center_surfaces", &center_surfaces).read("center_depths", &center_depths);
@@ -200,12 +205,16 @@ fn surfaces(
     samples: u32,
 ) -> Result<(ImageHandle, ImageHandle), TechniqueError> {
     let image = |graph: &mut Graph, name: &str, format| {
-        graph.image(&format!("post/sraa {what} {name}"), frame.image_info(format).samples(samples))
+        graph.image(
+            &format!("post/sraa {what} {name}"),
+            BufferRole::Filters,
+            frame.image_info(format).samples(samples),
+        )
     };
     let planes = image(graph, "surfaces", vk::Format::R8G8B8A8_UNORM);
     let depths = image(graph, "depths", vk::Format::D32_SFLOAT);
     let surfaces = Surfaces::shaded(frame, "post/sraa.frag", "post/sraa.frag#mask")?;
-    let mut pass = graph.raster(&format!("post/sraa-{what}"));
+    let mut pass = graph.raster(&format!("post/sraa-{what}"), PassRole::Filter);
     frame.bind_scene(&mut pass);
     // Depth 0 tells what holds nothing: the planes need no clear.
     let planes = pass.color(planes, Load::DontCare);

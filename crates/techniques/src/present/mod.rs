@@ -1,6 +1,6 @@
 //! The last stage of every frame: linear radiance to the image that is shown.
 
-use afterlight_graph::{Graph, ImageHandle, gpu::vk};
+use afterlight_graph::{BufferRole, Graph, ImageHandle, PassRole, gpu::vk};
 
 use crate::{error::TechniqueError, frame::Frame, view};
 
@@ -30,12 +30,12 @@ pub(crate) fn display(
     hdr: &ImageHandle,
     name: &str,
 ) -> Result<ImageHandle, TechniqueError> {
-    let target = graph.image(name, frame.image_info(vk::Format::R8G8B8A8_UNORM));
+    let target = graph.image(name, BufferRole::Targets, frame.image_info(vk::Format::R8G8B8A8_UNORM));
     let shader = match frame.shows(view::FINAL) {
         true => frame.shader("present/tonemap.comp")?,
         false => frame.shader("present/tonemap.comp#colors")?,
     };
-    let mut pass = frame.compute(graph, "present/tonemap", &shader);
+    let mut pass = frame.compute(graph, "present/tonemap", PassRole::Present, &shader);
     pass.read("hdr", hdr);
     let target = pass.write("final_color", target);
     pass.dispatch(frame.groups(8));

@@ -3,7 +3,7 @@
 //! The light sees the scene once a frame, in `shared/shadow`; whatever shades asks its depths, in `light_radiance` of
 //! `include/shading.glsl`. See the README of this folder.
 
-use afterlight_graph::{BufferHandle, Graph, ImageHandle, ImageInfo, gpu::vk};
+use afterlight_graph::{BufferHandle, BufferRole, Graph, ImageHandle, ImageInfo, PassRole, gpu::vk};
 use afterlight_scene::Projection;
 use afterlight_shader::structs::ShadowConstants;
 use glam::{Mat4, Vec3};
@@ -91,7 +91,7 @@ pub(crate) fn record(
         }
     };
     let buffer = light_view::upload(frame.device, "shared/shadow constants", &constants)?;
-    let constants = graph.import_buffer("shared/shadow constants", &buffer);
+    let constants = graph.import_buffer("shared/shadow constants", BufferRole::Constants, &buffer);
     frame.buffers.shadow = Some(Shadow { constants, map });
     Ok(())
 }
@@ -123,11 +123,11 @@ fn raster(
     bias: f32,
 ) -> Result<ImageHandle, TechniqueError> {
     let info = ImageInfo::new(vk::Format::D32_SFLOAT, size_px, size_px);
-    let map = graph.image("shared/shadow depth", info);
+    let map = graph.image("shared/shadow depth", BufferRole::Shared, info);
     let mut surfaces = Surfaces::depth_only(frame)?;
     // Less is farther.
     surfaces.depth_bias_slope = -2.0 * FILTER_REACH_TEXELS * bias;
-    Ok(surfaces.fill_depth(graph, frame, "shared/shadow", map))
+    Ok(surfaces.fill_depth(graph, frame, ("shared/shadow", PassRole::Shared), map))
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 // ORDER: 60
 
-use afterlight_graph::{Graph, ImageHandle, gpu::vk};
+use afterlight_graph::{Graph, ImageHandle, PassRole, gpu::vk};
 
 use crate::{
     Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError,
@@ -56,7 +56,8 @@ impl Technique for Tiled {
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let filled = gbuffer::fill(graph, frame, "tiled", vk::Format::D32_SFLOAT)?;
 
-        let mut pass = frame.compute(graph, "tiled/shade", &frame.shader("tiled/shade.comp")?);
+        let mut pass =
+            frame.compute(graph, "tiled/shade", PassRole::Shading, &frame.shader("tiled/shade.comp")?);
         gbuffer::bind(&mut pass, &filled);
         let radiance = pass.write("hdr", filled.accumulation);
         pass.dispatch(frame.groups(16));

@@ -6,7 +6,8 @@ mod sort;
 pub(crate) use sort::Blended;
 
 use afterlight_graph::{
-    Blend, BlendEquation, BufferHandle, DepthTest, DrawCall, Graph, ImageHandle, Load, RasterPass,
+    Blend, BlendEquation, BufferHandle, BufferRole, DepthTest, DrawCall, Graph, ImageHandle, Load, PassRole,
+    RasterPass,
     gpu::{self, vk},
 };
 
@@ -136,17 +137,22 @@ pub(crate) fn draw(
     let depth = opaque_depth(graph, frame)?;
     let lights = match technique {
         "forward" => LightStep::All,
-        _ => LightStep::anywhere(graph, frame, "shared/transparent")?,
+        _ => LightStep::anywhere(
+            graph,
+            frame,
+            "shared/transparent",
+            (PassRole::Transparency, BufferRole::Transparency),
+        )?,
     };
     let drawn = BlendedDraws {
         lights,
-        indices: graph.import_buffer("blended indices", &list.indices),
-        commands: graph.import_buffer("blended draw commands", &list.commands),
-        count: graph.import_buffer("blended draw count", &list.count),
+        indices: graph.import_buffer("blended indices", BufferRole::Scene, &list.indices),
+        commands: graph.import_buffer("blended draw commands", BufferRole::Scene, &list.commands),
+        count: graph.import_buffer("blended draw count", BufferRole::Scene, &list.count),
         max: list.command_count,
     };
     if frame.samples == 1 {
-        let mut pass = graph.raster("shared/transparent");
+        let mut pass = graph.raster("shared/transparent", PassRole::Transparency);
         frame.bind_scene(&mut pass);
         let hdr = pass.color(hdr, Load::Keep);
         pass.depth_read_only(&depth);
@@ -155,9 +161,10 @@ pub(crate) fn draw(
         return Ok(hdr);
     }
     let format = vk::Format::R16G16B16A16_SFLOAT;
-    let samples = graph.image("shared/transparent samples", frame.multisampled_info(format));
-    let layers = graph.image("shared/transparent layers", frame.image_info(format));
-    let mut pass = graph.raster("shared/transparent");
+    let samples =
+        graph.image("shared/transparent samples", BufferRole::Transparency, frame.multisampled_info(format));
+    let layers = graph.image("shared/transparent layers", BufferRole::Transparency, frame.image_info(format));
+    let mut pass = graph.raster("shared/transparent", PassRole::Transparency);
     frame.bind_scene(&mut pass);
     let _samples = pass.color(samples, Load::Clear([0.0, 0.0, 0.0, 1.0]));
     let layers = pass.resolve(layers);
@@ -167,7 +174,7 @@ pub(crate) fn draw(
 
     let composite =
         multisample::full_screen(frame, "transparent/composite.frag", &[])?.blend(vec![LAYERS_OVER_RADIANCE]);
-    let mut pass = graph.raster("shared/transparent composite");
+    let mut pass = graph.raster("shared/transparent composite", PassRole::Transparency);
     pass.read("layers", &layers);
     let hdr = pass.color(hdr, Load::Keep);
     multisample::draw_full_screen(&mut pass, composite, 0);
@@ -185,8 +192,13 @@ fn opaque_depth(graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, Tec
     if let Some(depth) = frame.opaque_depth.take().filter(fits) {
         return Ok(depth);
     }
-    let depth = graph.image("shared/transparent depth", image);
-    Ok(Surfaces::depth_only(frame)?.fill_depth(graph, frame, "shared/transparent depth", depth))
+    let depth = graph.image("shared/transparent depth", BufferRole::Transparency, image);
+    Ok(Surfaces::depth_only(frame)?.fill_depth(
+        graph,
+        frame,
+        ("shared/transparent depth", PassRole::Transparency),
+        depth,
+    ))
 }
 
 /// A sorted list as the graph knows it, and how its surfaces find their lights.

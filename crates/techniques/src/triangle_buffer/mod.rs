@@ -6,7 +6,7 @@
 //! turn bits into places, and a thread a marked triangle writes its record. No lock, no cache, each triangle once, in the order
 //! of draws.
 
-use afterlight_graph::{BufferHandle, ComputePass, Graph, RasterPass};
+use afterlight_graph::{BufferHandle, BufferRole, ComputePass, Graph, PassRole, RasterPass};
 
 use crate::{
     capacity::{self, FIRST_GUESS},
@@ -88,9 +88,10 @@ impl List {
             let what = format!("{technique}: triangles that a visibility sample's reference tells apart");
             return Err(TechniqueError::TooLarge { what, found: capacity.into(), limit: most.into() });
         }
-        let records = graph.buffer(&format!("{technique}/triangle buffer"), bytes);
-        let count = graph.buffer(&format!("{technique}/triangle count"), 8);
-        let count = graph.clear_buffer(&format!("{technique}/clear count"), count, 0);
+        let records = graph.buffer(&format!("{technique}/triangle buffer"), BufferRole::Triangles, bytes);
+        let count = graph.buffer(&format!("{technique}/triangle count"), BufferRole::TriangleSets, 8);
+        let count =
+            graph.clear_buffer(&format!("{technique}/clear count"), PassRole::TriangleSelection, count, 0);
         Ok(Self { records, count, capacity })
     }
 
@@ -112,9 +113,10 @@ impl List {
         frame: &Frame<'_>,
         technique: &str,
     ) -> Result<Records, TechniqueError> {
-        let groups = graph.buffer(&format!("{technique}/dispatch groups"), 12);
+        let groups = graph.buffer(&format!("{technique}/dispatch groups"), BufferRole::TriangleSets, 12);
         let shader = frame.shader("triangle_buffer/size.comp")?;
-        let mut pass = frame.compute(graph, &format!("{technique}/size"), &shader);
+        let mut pass =
+            frame.compute(graph, &format!("{technique}/size"), PassRole::TriangleSelection, &shader);
         pass.constant("TRIANGLE_CAPACITY", self.capacity);
         pass.read("TriangleCount", &self.count);
         let groups = pass.write("DispatchGroups", groups);
@@ -124,7 +126,8 @@ impl List {
         let ids = RecordIds::wanted(graph, frame, technique, self.capacity);
         let stored = if frame.tessellate_px.is_some() { "vertices" } else { "list" };
         let shader = frame.shader(&format!("triangle_buffer/derivatives.comp#{stored}{}", ids.tag('-')))?;
-        let mut pass = frame.compute(graph, &format!("{technique}/derivatives"), &shader);
+        let mut pass =
+            frame.compute(graph, &format!("{technique}/derivatives"), PassRole::Derivatives, &shader);
         pass.constant("TRIANGLE_CAPACITY", self.capacity);
         pass.read("TriangleCount", &self.count);
         let words = pass.write("TriangleBuffer", self.records);
@@ -145,7 +148,9 @@ impl RecordIds {
     fn wanted(graph: &mut Graph, frame: &Frame<'_>, technique: &str, capacity: u32) -> Self {
         let wanted = view::compares_triangles(frame.view) && frame.tessellate_px.is_none();
         let bytes = 4 * u64::from(capacity.max(1));
-        Self(wanted.then(|| graph.buffer(&format!("{technique}/record ids"), bytes)))
+        Self(
+            wanted.then(|| graph.buffer(&format!("{technique}/record ids"), BufferRole::TriangleSets, bytes)),
+        )
     }
 
     /// Tag of the derivative pass's variant, with a separator before it; empty without IDs.
@@ -184,7 +189,7 @@ pub fn fill(
     let name = |stage: &str| format!("{technique}/{stage}");
     let bits = bits(graph, frame, technique, 0);
     let shader = frame.shader(&format!("triangle_buffer/mark.comp{}", visible.tag('#')))?;
-    let mut pass = frame.compute(graph, &name("mark"), &shader);
+    let mut pass = frame.compute(graph, &name("mark"), PassRole::TriangleSelection, &shader);
     pass.constant("SAMPLES", visible.samples());
     visible.bind(frame, &mut pass);
     let bits = pass.write("MarkedBits", bits);
@@ -201,8 +206,8 @@ fn draw_count(frame: &Frame<'_>) -> u32 {
 /// Declares a bit for each triangle of the scene, 1,024 a draw, 32 of them the word `value`.
 pub fn bits(graph: &mut Graph, frame: &Frame<'_>, technique: &str, value: u32) -> BufferHandle {
     let bytes = 4 * u64::from(draw_count(frame)) * WORDS_A_DRAW;
-    let bits = graph.buffer(&format!("{technique}/visible bits"), bytes);
-    graph.clear_buffer(&format!("{technique}/clear bits"), bits, value)
+    let bits = graph.buffer(&format!("{technique}/visible bits"), BufferRole::TriangleSets, bytes);
+    graph.clear_buffer(&format!("{technique}/clear bits"), PassRole::TriangleSelection, bits, value)
 }
 
 /// Declares the passes that store every triangle whose bit is set; `by_keys`: bits stand in the order of draws instead of that
@@ -220,13 +225,19 @@ pub fn store_marked(
     let name = |stage: &str| format!("{technique}/{stage}");
     let draws = draw_count(frame);
     let (capacity, bytes) = room(frame, technique)?;
-    let before = graph.buffer(&name("visible before"), 4 * u64::from(draws) * WORDS_A_DRAW);
-    let of_draw = graph.buffer(&name("visible of draw"), 4 * u64::from(draws));
-    let base = graph.buffer(&name("draw base"), 4 * u64::from(draws));
-    let count = graph.buffer(&name("triangle count"), 8);
-    let words = graph.buffer(&name("triangle buffer"), bytes);
+    let before =
+        graph.buffer(&name("visible before"), BufferRole::TriangleSets, 4 * u64::from(draws) * WORDS_A_DRAW);
+    let of_draw = graph.buffer(&name("visible of draw"), BufferRole::TriangleSets, 4 * u64::from(draws));
+    let base = graph.buffer(&name("draw base"), BufferRole::TriangleSets, 4 * u64::from(draws));
+    let count = graph.buffer(&name("triangle count"), BufferRole::TriangleSets, 8);
+    let words = graph.buffer(&name("triangle buffer"), BufferRole::Triangles, bytes);
 
-    let mut pass = frame.compute(graph, &name("count"), &frame.shader("triangle_buffer/count.comp")?);
+    let mut pass = frame.compute(
+        graph,
+        &name("count"),
+        PassRole::TriangleSelection,
+        &frame.shader("triangle_buffer/count.comp")?,
+    );
     pass.constant("DRAWS", draws);
     pass.read("VisibleBits", &bits);
     let before = pass.write("WordCounts", before);
@@ -234,7 +245,12 @@ pub fn store_marked(
     pass.dispatch([draws.div_ceil(64), 1, 1]);
     pass.finish();
 
-    let mut pass = frame.compute(graph, &name("scan"), &frame.shader("triangle_buffer/scan.comp")?);
+    let mut pass = frame.compute(
+        graph,
+        &name("scan"),
+        PassRole::TriangleSelection,
+        &frame.shader("triangle_buffer/scan.comp")?,
+    );
     pass.constant("DRAWS", draws).constant("TRIANGLE_CAPACITY", capacity);
     pass.read("VisibleOfDraw", &of_draw);
     let base = pass.write("DrawBaseOut", base);
@@ -245,7 +261,7 @@ pub fn store_marked(
     let ids = RecordIds::wanted(graph, frame, technique, capacity);
     let tag = if by_keys { format!("#keys{}", ids.tag('-')) } else { ids.tag('#') };
     let shader = frame.shader(&format!("triangle_buffer/derivatives.comp{tag}"))?;
-    let mut pass = frame.compute(graph, &name("derivatives"), &shader);
+    let mut pass = frame.compute(graph, &name("derivatives"), PassRole::Derivatives, &shader);
     pass.constant("TRIANGLE_CAPACITY", capacity);
     pass.read("VisibleBits", &bits).read("VisibleBefore", &before).read("DrawBase", &base);
     if by_keys {

@@ -3,7 +3,7 @@
 //! Where they are counted, `light_radiance` and what stands beside it in `include/shading.glsl` give counts in the place of radiance, and
 //! nothing else gives any: the image that a technique ends in, whatever way it sums lights, holds two counts a pixel.
 
-use afterlight_graph::{Graph, ImageHandle, gpu::vk};
+use afterlight_graph::{BufferRole, Graph, ImageHandle, PassRole, gpu::vk};
 use half::f16;
 
 use crate::{error::TechniqueError, frame::Frame};
@@ -78,8 +78,13 @@ pub(crate) fn light_pair_colors(
     frame: &Frame<'_>,
     counts: &ImageHandle,
 ) -> Result<ImageHandle, TechniqueError> {
-    let target = graph.image("view/light pairs", frame.image_info(vk::Format::R16G16B16A16_SFLOAT));
-    let mut pass = frame.compute(graph, "view/light-pairs", &frame.shader("view/light_pairs.comp")?);
+    let target = graph.image(
+        "view/light pairs",
+        BufferRole::Targets,
+        frame.image_info(vk::Format::R16G16B16A16_SFLOAT),
+    );
+    let mut pass =
+        frame.compute(graph, "view/light-pairs", PassRole::Upkeep, &frame.shader("view/light_pairs.comp")?);
     pass.constant("LIGHT_ERROR", u32::from(frame.shows(LIGHT_ERROR)));
     pass.read("light_pairs", counts);
     let target = pass.write("hdr", target);

@@ -10,7 +10,7 @@ pub(crate) use light_pairs::{LIGHT_PAIR, light_pair_colors};
 pub(crate) use light_pairs::{light_pairs_constant, replaces_light};
 pub use records::{ATTRIBUTE_ERRORS, RECORD_SAMPLES, RecordSource};
 
-use afterlight_graph::{Graph, ImageHandle, RasterPass, gpu::vk};
+use afterlight_graph::{BufferRole, Graph, ImageHandle, PassRole, RasterPass, gpu::vk};
 
 use crate::{
     clusters::{CLUSTER_PX, TILE_PX},
@@ -80,9 +80,12 @@ pub struct InvocationCount(ImageHandle);
 impl InvocationCount {
     /// Declares the count, zero everywhere.
     pub fn new(graph: &mut Graph, frame: &Frame<'_>, technique: &str) -> Self {
-        let image =
-            graph.image(&format!("{technique}/invocation count"), frame.image_info(vk::Format::R32_UINT));
-        Self(graph.clear_image(&format!("{technique}/clear count"), image, [0.0; 4]))
+        let image = graph.image(
+            &format!("{technique}/invocation count"),
+            BufferRole::Counters,
+            frame.image_info(vk::Format::R32_UINT),
+        );
+        Self(graph.clear_image(&format!("{technique}/clear count"), PassRole::Upkeep, image, [0.0; 4]))
     }
 
     /// Binds it to a pass whose shaders were compiled with COUNT_INVOCATIONS.
@@ -100,9 +103,17 @@ impl InvocationCount {
         frame: &Frame<'_>,
         technique: &str,
     ) -> Result<ImageHandle, TechniqueError> {
-        let target =
-            graph.image(&format!("{technique}/heat"), frame.image_info(vk::Format::R16G16B16A16_SFLOAT));
-        let mut pass = frame.compute(graph, &format!("{technique}/heat"), &frame.shader("view/heat.comp")?);
+        let target = graph.image(
+            &format!("{technique}/heat"),
+            BufferRole::Targets,
+            frame.image_info(vk::Format::R16G16B16A16_SFLOAT),
+        );
+        let mut pass = frame.compute(
+            graph,
+            &format!("{technique}/heat"),
+            PassRole::Upkeep,
+            &frame.shader("view/heat.comp")?,
+        );
         pass.read("invocation_count", &self.0);
         let target = pass.write("hdr", target);
         pass.dispatch(frame.groups(8));

@@ -1,6 +1,6 @@
 //! Views of techniques whose samples refer to records of a triangle buffer.
 
-use afterlight_graph::{ComputePass, Graph, ImageHandle, Load, gpu::vk};
+use afterlight_graph::{BufferRole, ComputePass, Graph, ImageHandle, Load, PassRole, gpu::vk};
 
 use super::TEXTURE_ERROR;
 use crate::{
@@ -55,8 +55,8 @@ impl RecordSource<'_> {
     /// A shader that is not compiled in.
     fn sharing(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let bytes = 4 * u64::from(self.records.capacity.max(1));
-        let counts = graph.buffer(&self.name(RECORD_SAMPLES), bytes);
-        let counts = graph.clear_buffer(&self.name("clear record samples"), counts, 0);
+        let counts = graph.buffer(&self.name(RECORD_SAMPLES), BufferRole::Counters, bytes);
+        let counts = graph.clear_buffer(&self.name("clear record samples"), PassRole::Upkeep, counts, 0);
         let mut pass = self.pass(graph, frame, "sharing count", "sharing_count")?;
         let counts = pass.write("RecordSamples", counts);
         pass.dispatch(frame.groups(8));
@@ -89,7 +89,7 @@ impl RecordSource<'_> {
         };
         let [position, color] = self.reference(graph, frame)?;
         let pixels = u64::from(frame.width_px) * u64::from(frame.height_px);
-        let errors = graph.buffer(&self.name(ATTRIBUTE_ERRORS), 8 * pixels);
+        let errors = graph.buffer(&self.name(ATTRIBUTE_ERRORS), BufferRole::Counters, 8 * pixels);
         let target = self.target(graph, frame);
         let mut pass = self.pass(graph, frame, "attribute error", "attribute_error")?;
         pass.constant("TEXTURE_ERROR", u32::from(frame.shows(TEXTURE_ERROR)));
@@ -106,13 +106,14 @@ impl RecordSource<'_> {
 
     /// World position with triangle ID, and base colour, of what shows at pixel centres.
     fn reference(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<[ImageHandle; 2], TechniqueError> {
-        let image =
-            |graph: &mut Graph, name: &str, format| graph.image(&self.name(name), frame.image_info(format));
+        let image = |graph: &mut Graph, name: &str, format| {
+            graph.image(&self.name(name), BufferRole::Counters, frame.image_info(format))
+        };
         let position = image(graph, "reference position", vk::Format::R32G32B32A32_UINT);
         let color = image(graph, "reference color", vk::Format::R32G32B32A32_SFLOAT);
         let depth = image(graph, "reference depth", vk::Format::D32_SFLOAT);
         let surfaces = Surfaces::shaded(frame, "view/reference.frag", "view/reference.frag#mask")?;
-        let mut pass = graph.raster(&self.name("reference"));
+        let mut pass = graph.raster(&self.name("reference"), PassRole::Upkeep);
         frame.bind_scene(&mut pass);
         let position = pass.color_uint(position, Load::Clear(NO_TRIANGLE_UINT));
         let color = pass.color(color, Load::DontCare);
@@ -127,7 +128,11 @@ impl RecordSource<'_> {
     }
 
     fn target(&self, graph: &mut Graph, frame: &Frame<'_>) -> ImageHandle {
-        graph.image(&self.name(frame.view), frame.image_info(vk::Format::R16G16B16A16_SFLOAT))
+        graph.image(
+            &self.name(frame.view),
+            BufferRole::Targets,
+            frame.image_info(vk::Format::R16G16B16A16_SFLOAT),
+        )
     }
 
     /// A pass that goes through the records of every pixel.
@@ -139,7 +144,7 @@ impl RecordSource<'_> {
         shader: &str,
     ) -> Result<ComputePass<'g>, TechniqueError> {
         let shader = frame.shader(&format!("view/{shader}.comp#{}", self.tag))?;
-        let mut pass = frame.compute(graph, &self.name(stage), &shader);
+        let mut pass = frame.compute(graph, &self.name(stage), PassRole::Upkeep, &shader);
         pass.constant("SAMPLES", self.samples);
         (self.bind)(&mut pass);
         Ok(pass)

@@ -2,7 +2,7 @@
 
 // ORDER: 70
 
-use afterlight_graph::{Graph, ImageHandle, Load, gpu::vk};
+use afterlight_graph::{BufferRole, Graph, ImageHandle, Load, PassRole, gpu::vk};
 
 use crate::{
     Answers, AppendixA, Exactness, Frame, Info, Params, Source, Technique, TechniqueError,
@@ -65,15 +65,17 @@ impl Technique for Visibility {
         if compute_raster::is_chosen(frame, &INFO)? {
             return shade_keys(graph, frame);
         }
-        let ids = graph.image("visibility/ids", frame.image_info(vk::Format::R32_UINT));
-        let depth = graph.image("visibility/depth", frame.image_info(vk::Format::D32_SFLOAT));
+        let ids =
+            graph.image("visibility/ids", BufferRole::Visibility, frame.image_info(vk::Format::R32_UINT));
+        let depth =
+            graph.image("visibility/depth", BufferRole::Depth, frame.image_info(vk::Format::D32_SFLOAT));
         let surfaces = geometry::Surfaces::new(
             frame,
             ("geometry/surface.vert#position", Some("visibility/ids.frag")),
             ("geometry/surface.vert#uv", "visibility/ids.frag#mask"),
         )?;
 
-        let mut pass = graph.raster("visibility/ids");
+        let mut pass = graph.raster("visibility/ids", PassRole::Geometry);
         frame.bind_scene(&mut pass);
         let ids = pass.color_uint(ids, Load::Clear([NO_TRIANGLE; 4]));
         let depth = pass.depth(depth, Load::Clear(0.0));
@@ -106,9 +108,17 @@ fn shade(
     bind: &dyn Fn(&mut dyn SourceSlots),
 ) -> Result<ImageHandle, TechniqueError> {
     let step = LightStep::build(graph, frame, &INFO, surfaces)?;
-    let radiance = graph.image("visibility/radiance", frame.image_info(vk::Format::R16G16B16A16_SFLOAT));
-    let mut pass =
-        frame.compute(graph, "visibility/shade", &frame.shader(&format!("visibility/shade.comp{tag}"))?);
+    let radiance = graph.image(
+        "visibility/radiance",
+        BufferRole::Targets,
+        frame.image_info(vk::Format::R16G16B16A16_SFLOAT),
+    );
+    let mut pass = frame.compute(
+        graph,
+        "visibility/shade",
+        PassRole::Shading,
+        &frame.shader(&format!("visibility/shade.comp{tag}"))?,
+    );
     bind(&mut pass);
     step.bind(frame, &mut pass);
     for (constant, value) in step.constants() {
