@@ -353,8 +353,24 @@ fn compare_writes_the_schema_table_and_report() {
         );
         assert!(result["difference"]["max_abs"].is_u64() && result["difference"]["flip"].is_number());
     }
-    // The table went to standard error, since JSON took standard output.
-    assert!(text(&output.stderr).contains("tiled/"), "{}", text(&output.stderr));
+    // The summary went to standard error, since JSON took standard output; passes are shown where they are asked for alone.
+    let told = text(&output.stderr);
+    let last: Vec<&str> = told.lines().rev().take(2).collect();
+    assert!(
+        last[1].starts_with("fastest exact technique: ") && last[0].starts_with("least memory"),
+        "{told}"
+    );
+    assert!(!told.contains("tiled/"), "{told}");
+    let output = run_in(
+        folder.path(),
+        &[&["compare", "builtin:spheres", "--techniques", "tiled,deferred-dedup"], &["--passes"][..], &SMALL]
+            .concat(),
+    );
+    let told = text(&output.stdout);
+    assert!(
+        told.contains("tiled/shade") && told.contains("but with --samples 2, 4, 8 or 16: deferred-dedup"),
+        "{told}"
+    );
     let html = fs::read_to_string(folder.path().join("r/report.html")).expect("written");
     assert!(html.contains("data:image/png;base64,") && html.contains("tiled"));
     assert!(folder.path().join("r/report.json").is_file());

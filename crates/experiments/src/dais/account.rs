@@ -9,11 +9,11 @@
 use afterlight_graph::gpu::Device;
 use afterlight_graph::{BufferRole, Executor, Graph, PassRole};
 use afterlight_lab::LabError;
-use afterlight_measure::{Buffer, Pass, RunResult, Spread};
+use afterlight_measure::{Buffer, Pass, PassWork, RunResult, Spread};
 use serde::Serialize;
 
 use super::share_needed;
-use crate::kit::{Phase, owner_and_stage, part, phase};
+use crate::kit::{Phase, of_role, phase};
 
 /// Fills and copies that a bandwidth is measured by.
 const COPIES: usize = 8;
@@ -75,47 +75,57 @@ impl Bandwidth {
 /// Bytes below which a pass is bound by its start, not by memory, so that no floor is told.
 const FLOOR_BYTES_MIN: u64 = 1 << 16;
 
-/// Which resources of a pass, by their names without the technique.
+/// Which resources of a pass.
+#[derive(Clone, Copy)]
 enum Parts {
     All,
-    Of(&'static [&'static str]),
-}
-
-/// A stage with what it touches in full.
-struct Known {
-    stage: &'static str,
-    reads: Parts,
-    writes: Parts,
+    /// Those of some roles.
+    Of(&'static [BufferRole]),
 }
 
 const NOTHING: Parts = Parts::Of(&[]);
 
-/// Stages whose bytes are known, besides clears.
-const KNOWN: &[Known] = &[
-    Known { stage: "rsm", reads: NOTHING, writes: Parts::All },
-    Known { stage: "gbuffer", reads: NOTHING, writes: Parts::All },
-    Known { stage: "ids", reads: NOTHING, writes: Parts::All },
-    Known { stage: "depth", reads: NOTHING, writes: Parts::All },
-    Known {
-        stage: "fill",
-        reads: Parts::Of(&["depth"]),
-        writes: Parts::Of(&["references", "wide references"]),
-    },
-    Known { stage: "mark", reads: Parts::Of(&["ids", "sample keys"]), writes: NOTHING },
-    Known { stage: "derivatives", reads: NOTHING, writes: Parts::Of(&["triangle buffer"]) },
-    Known {
-        stage: "shade",
-        reads: Parts::Of(&["ids", "references", "wide references", "heads", "sample keys"]),
-        writes: Parts::Of(&["radiance"]),
-    },
-    Known { stage: "tonemap", reads: Parts::All, writes: Parts::All },
-];
+/// What a pass touches in full: what it reads, and what it writes. None where nothing is known to be.
+fn touched_in_full(role: PassRole, work: PassWork, tests_depth: bool) -> Option<(Parts, Parts)> {
+    use BufferRole::{
+        Counters, Depth, SampleKeys, SurfaceListHeads, Surfaces, Targets, Triangles, Visibility,
+    };
+    match work {
+        PassWork::Clear => return Some((NOTHING, Parts::All)),
+        PassWork::Copy => return Some((Parts::All, Parts::All)),
+        PassWork::Raster | PassWork::Compute => {}
+    }
+    match role {
+        PassRole::Shared | PassRole::DepthPrepass => Some((NOTHING, Parts::All)),
+        // After a depth pre-pass depth is tested, and surfaces are written once a sample.
+        PassRole::Geometry if work == PassWork::Raster && tests_depth => {
+            Some((Parts::Of(&[Depth]), Parts::Of(&[Surfaces, Visibility])))
+        }
+        PassRole::Geometry if work == PassWork::Raster => {
+            Some((NOTHING, Parts::Of(&[Surfaces, Visibility, Depth, Counters])))
+        }
+        // What compute rasterises is bound by its triangles.
+        PassRole::Geometry => None,
+        PassRole::TriangleSelection => Some((Parts::Of(&[Visibility, SampleKeys]), NOTHING)),
+        PassRole::Derivatives => Some((NOTHING, Parts::Of(&[Triangles]))),
+        PassRole::Shading => {
+            Some((Parts::Of(&[Visibility, SurfaceListHeads, SampleKeys]), Parts::Of(&[Targets])))
+        }
+        PassRole::Present => Some((Parts::All, Parts::All)),
+        PassRole::LightAssignment
+        | PassRole::Resolve
+        | PassRole::Transparency
+        | PassRole::Filter
+        | PassRole::Upkeep => None,
+    }
+}
 
 /// A pass beside its floor.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct Accounted {
     pub(crate) pass: String,
-    pub(crate) phase: Phase,
+    /// None in a record from before passes had roles.
+    pub(crate) phase: Option<Phase>,
     pub(crate) ms: Option<f64>,
     /// Bytes that it reads and writes in full; none where no resource of it is known to be.
     pub(crate) known_bytes: Option<u64>,
@@ -134,7 +144,7 @@ pub(crate) fn account(result: &RunResult, bandwidth: Option<Bandwidth>) -> Vec<A
         let floor_ms = floor_bytes.zip(bandwidth).map(|(bytes, bandwidth)| bandwidth.ms(bytes as f64));
         Accounted {
             pass: pass.name.clone(),
-            phase: phase(&pass.name),
+            phase: phase(pass),
             ms,
             known_bytes,
             floor_ms,
@@ -146,24 +156,20 @@ pub(crate) fn account(result: &RunResult, bandwidth: Option<Bandwidth>) -> Vec<A
 
 /// Bytes that a pass reads and writes in full; `share` is the part of the triangle buffer that is used.
 fn known_bytes(pass: &Pass, share: f64) -> Option<u64> {
-    let (_, stage) = owner_and_stage(&pass.name);
-    let sum = |buffers: &[Buffer], parts: &Parts| {
+    let tests_depth = of_role(&pass.reads, BufferRole::Depth).is_some();
+    let (reads, writes) = touched_in_full(pass.role?, pass.work?, tests_depth)?;
+    let sum = |buffers: &[Buffer], parts: Parts| {
         let counts = |buffer: &&Buffer| match parts {
             Parts::All => true,
-            Parts::Of(parts) => parts.contains(&part(&buffer.name)),
+            Parts::Of(roles) => buffer.role.is_some_and(|role| roles.contains(&role)),
         };
-        let bytes = |buffer: &Buffer| match part(&buffer.name) {
-            "triangle buffer" => (buffer.bytes as f64 * share) as u64,
-            _ => buffer.bytes,
+        let bytes = |buffer: &Buffer| match buffer.role == Some(BufferRole::Triangles) {
+            true => (buffer.bytes as f64 * share) as u64,
+            false => buffer.bytes,
         };
         buffers.iter().filter(counts).map(bytes).sum::<u64>()
     };
-    let bytes = if stage.starts_with("clear ") {
-        sum(&pass.writes, &Parts::All)
-    } else {
-        let known = KNOWN.iter().find(|known| known.stage == stage)?;
-        sum(&pass.reads, &known.reads) + sum(&pass.writes, &known.writes)
-    };
+    let bytes = sum(&pass.reads, reads) + sum(&pass.writes, writes);
     (bytes > 0).then_some(bytes)
 }
 
@@ -172,16 +178,26 @@ mod tests {
     use super::*;
     use afterlight_measure::Status;
 
-    fn pass(name: &str, reads: &[(&str, u64)], writes: &[(&str, u64)]) -> Pass {
-        let buffers = |all: &[(&str, u64)]| {
-            all.iter()
-                .map(|(name, bytes)| Buffer { name: (*name).into(), role: None, bytes: *bytes })
-                .collect()
+    use crate::kit::phases::tests::renamed;
+    use BufferRole::{
+        Depth, SampleKeys, SurfaceListHeads, SurfaceListNodes, Targets, TriangleSets, Triangles, Visibility,
+    };
+
+    type Buffers<'a> = &'a [(BufferRole, u64)];
+
+    fn pass(role: PassRole, work: PassWork, reads: Buffers<'_>, writes: Buffers<'_>) -> Pass {
+        let buffers = |all: Buffers<'_>| {
+            let buffer = |(role, bytes): &(BufferRole, u64)| Buffer {
+                name: role.to_string(),
+                role: Some(*role),
+                bytes: *bytes,
+            };
+            all.iter().map(buffer).collect()
         };
         Pass {
-            name: name.into(),
-            role: None,
-            work: None,
+            name: format!("dais/{role}"),
+            role: Some(role),
+            work: Some(work),
             ms: Spread::of(&[2.0]),
             reads: buffers(reads),
             writes: buffers(writes),
@@ -191,27 +207,41 @@ mod tests {
 
     #[test]
     fn only_what_is_touched_in_full_counts() {
-        let of = |pass: &Pass| known_bytes(pass, 0.25);
-        let shade = pass(
-            "dais/shade",
-            &[("dais/ids", 100), ("dais/depth", 70), ("dais/triangle buffer", 900)],
-            &[("dais/radiance", 20)],
-        );
-        assert_eq!(of(&shade), Some(120));
-        assert_eq!(
-            of(&pass("dais/derivatives", &[("dais/visible bits", 8)], &[("dais/triangle buffer", 400)])),
-            Some(100)
-        );
-        assert_eq!(of(&pass("dais/clear bits", &[], &[("dais/visible bits", 8)])), Some(8));
-        assert_eq!(of(&pass("dais/scan", &[("dais/visible of draw", 8)], &[])), None);
-        assert_eq!(of(&pass("dais/large triangles", &[], &[("dais/sample keys", 8)])), None);
-        let fill = pass(
-            "dais-list/fill",
-            &[("dais-list/depth", 40)],
-            &[("dais-list/heads", 4), ("dais-list/nodes", 99), ("dais-list/depth", 40)],
-        );
-        assert_eq!(of(&fill), Some(40));
-        assert_eq!(of(&Pass { name: "dais-list/fill 2".to_owned(), ..fill }), Some(40));
+        use PassRole::{DepthPrepass, Derivatives, Geometry, Shading, TriangleSelection};
+        use PassWork::{Clear, Compute, Raster};
+        let of = |role, work, reads: Buffers<'_>, writes: Buffers<'_>| {
+            known_bytes(&pass(role, work, reads, writes), 0.25)
+        };
+        let surfaces = [(Visibility, 100), (Depth, 70), (Triangles, 900)];
+        assert_eq!(of(Shading, Compute, &surfaces, &[(Targets, 20)]), Some(120));
+        assert_eq!(of(Derivatives, Compute, &[(TriangleSets, 8)], &[(Triangles, 400)]), Some(100));
+        assert_eq!(of(TriangleSelection, Clear, &[], &[(TriangleSets, 8)]), Some(8));
+        assert_eq!(of(TriangleSelection, Compute, &[(TriangleSets, 8)], &[]), None);
+        assert_eq!(of(TriangleSelection, Compute, &[(SampleKeys, 80)], &[(TriangleSets, 8)]), Some(80));
+        assert_eq!(of(Geometry, Compute, &[], &[(SampleKeys, 8)]), None);
+        assert_eq!(of(Geometry, Raster, &[], &[(Visibility, 40), (Depth, 40)]), Some(80));
+        assert_eq!(of(DepthPrepass, Raster, &[], &[(Depth, 40)]), Some(40));
+        let lists = [(SurfaceListHeads, 4), (SurfaceListNodes, 99), (Depth, 40)];
+        assert_eq!(of(Geometry, Raster, &[(Depth, 40)], &lists), Some(40));
+        assert_eq!(of(Geometry, Raster, &[(Depth, 40)], &[(Visibility, 40)]), Some(80));
+    }
+
+    #[test]
+    fn names_are_for_people() {
+        let mut result = RunResult::without_figures("dais", Status::Ok, "");
+        result.passes = vec![
+            pass(PassRole::Geometry, PassWork::Raster, &[], &[(Visibility, 1 << 20), (Depth, 1 << 20)]),
+            pass(PassRole::Shading, PassWork::Compute, &[(Visibility, 1 << 20)], &[(Targets, 1 << 20)]),
+        ];
+        let bandwidth = Bandwidth::of(500_000_000, &[0.6], &[2.0]);
+        let told = |result: &RunResult| {
+            account(result, bandwidth)
+                .into_iter()
+                .map(|one| Accounted { pass: String::new(), ..one })
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(told(&renamed(&result)), told(&result));
+        assert_eq!(told(&result)[1].phase, Some(Phase::Shade));
     }
 
     #[test]
@@ -225,11 +255,11 @@ mod tests {
         assert!((Bandwidth::of(500_000_000, &[], &[1.0]).expect("there").gb_per_s - 1000.0).abs() < 1e-9);
         assert_eq!(Bandwidth::of(1, &[1.0], &[]), None);
         let mut result = RunResult::without_figures("dais", Status::Ok, "");
-        result.passes = vec![pass("dais/ids", &[], &[("dais/ids", 1_000_000_000)])];
+        result.passes = vec![pass(PassRole::Geometry, PassWork::Raster, &[], &[(Visibility, 1_000_000_000)])];
         let found = account(&result, Some(bandwidth));
         assert_eq!((found[0].floor_ms, found[0].over_floor), (Some(1.0), Some(2.0)));
         assert_eq!(account(&result, None)[0].over_floor, None);
-        result.passes = vec![pass("dais/clear count", &[], &[("dais/triangle count", 16)])];
+        result.passes = vec![pass(PassRole::TriangleSelection, PassWork::Clear, &[], &[(TriangleSets, 16)])];
         let found = account(&result, Some(bandwidth));
         assert_eq!((found[0].known_bytes, found[0].over_floor), (Some(16), None));
     }
@@ -237,20 +267,16 @@ mod tests {
     /// A pass whose time is told apart for every kind of column.
     #[test]
     fn phases_are_the_papers() {
-        for (name, expected) in [
-            ("shared/rsm", Phase::Indirect),
-            ("dais/depth", Phase::Prepass),
-            ("dais-list/depth 2", Phase::Prepass),
-            ("dais-list/fill", Phase::Fill),
-            ("dais/large triangles", Phase::Fill),
-            ("dais/clear keys", Phase::Fill),
-            ("dais/clear bits", Phase::Find),
-            ("dais/mark", Phase::Find),
-            ("dais-list/derivatives", Phase::Derivatives),
-            ("dais-multirate/shade", Phase::Shade),
-            ("present/tonemap", Phase::Present),
+        for (role, expected) in [
+            (PassRole::Shared, Phase::Indirect),
+            (PassRole::DepthPrepass, Phase::Prepass),
+            (PassRole::Geometry, Phase::Fill),
+            (PassRole::TriangleSelection, Phase::Find),
+            (PassRole::Derivatives, Phase::Derivatives),
+            (PassRole::Shading, Phase::Shade),
+            (PassRole::Present, Phase::Present),
         ] {
-            assert_eq!(phase(name), expected, "{name}");
+            assert_eq!(phase(&pass(role, PassWork::Compute, &[], &[])), Some(expected), "{role}");
         }
     }
 }

@@ -203,7 +203,7 @@ fn cell(column: &Column, result: &RunResult, at: f32) -> ViewCell {
 
 /// Most triangles that reached clipping in one pass over the scene; none where no pass counts them.
 pub(crate) fn triangles_drawn(result: &RunResult) -> Option<u64> {
-    let of_scene = result.passes.iter().filter(|pass| phase(&pass.name) != Phase::Indirect);
+    let of_scene = result.passes.iter().filter(|pass| phase(pass) != Some(Phase::Indirect));
     let counts = of_scene.filter_map(|pass| pass.statistics.get("clipping_invocations").copied());
     counts.max().filter(|count| *count > 0)
 }
@@ -369,7 +369,7 @@ pub(crate) fn claim(
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use afterlight_measure::{Buffer, Memory, Pass};
+    use afterlight_measure::{Buffer, BufferRole, Memory, Pass, PassRole, PassWork};
 
     /// The paper's conditions.
     pub fn conditions() -> Conditions {
@@ -393,23 +393,23 @@ pub(crate) mod tests {
             let (geometry_ms, mib) = views[view];
             let mut result = RunResult::without_figures(kind.technique(), Status::Ok, "");
             result.reason = None;
-            let pass = |name: &str, ms: f64, triangles: u64| Pass {
+            let pass = |name: &str, role: PassRole, ms: f64, triangles: u64| Pass {
                 name: name.into(),
-                role: None,
-                work: None,
+                role: Some(role),
+                work: Some(PassWork::Raster),
                 ms: Spread::of(&[ms]),
                 reads: Vec::new(),
                 writes: Vec::new(),
                 statistics: [("clipping_invocations".to_owned(), triangles)].into(),
             };
             result.passes = vec![
-                pass("shared/rsm", 100.0, 900),
-                pass(&format!("{}/gbuffer", kind.technique()), geometry_ms, 70),
-                pass(&format!("{}/shade", kind.technique()), 50.0, 0),
+                pass("shared/rsm", PassRole::Shared, 100.0, 900),
+                pass(&format!("{}/gbuffer", kind.technique()), PassRole::Geometry, geometry_ms, 70),
+                pass(&format!("{}/shade", kind.technique()), PassRole::Shading, 50.0, 0),
             ];
             let buffers = vec![Buffer {
                 name: "dais/ids".into(),
-                role: Some(afterlight_graph::BufferRole::Visibility),
+                role: Some(BufferRole::Visibility),
                 bytes: mib << 20,
             }];
             result.memory = Some(Memory { technique_bytes: 0, peak_bytes: 0, buffers });

@@ -11,12 +11,12 @@ use afterlight_lab::spec::check_samples;
 use afterlight_lab::{
     FrameSpec, LabError, Listener, Measured, Session, Setup, choose, measure_setups, open_device,
 };
-use afterlight_measure::{RunResult, Status};
+use afterlight_measure::{Buffer, BufferRole, RunResult, Status};
 use afterlight_techniques::cost::Workload;
 use afterlight_techniques::{Indirect, Renderer, find};
 use serde::Serialize;
 
-use crate::kit::{MIB, Phase, at_size, check_run, counter, part, phase, stand_in};
+use crate::kit::{MIB, Phase, at_size, check_run, counter, of_role, phase, stand_in};
 
 pub(crate) use paper::{PAPER, PAPER_SAMPLES, PaperRow, PaperScene, paper_px, paper_record};
 
@@ -262,6 +262,7 @@ pub(crate) struct Times {
     pub derivatives_ms: Option<f64>,
     /// All before shading but the light's view: the first phase of deferred shading.
     pub geometry_ms: Option<f64>,
+    /// Finding lights included.
     pub shade_ms: Option<f64>,
     pub frame_ms: Option<f64>,
 }
@@ -269,7 +270,8 @@ pub(crate) struct Times {
 impl Times {
     pub fn of(result: &RunResult) -> Times {
         let sum = |phases: &[Phase]| {
-            let of_phases = result.passes.iter().filter(|pass| phases.contains(&phase(&pass.name)));
+            let of_phases =
+                result.passes.iter().filter(|pass| phase(pass).is_some_and(|one| phases.contains(&one)));
             let times: Vec<f64> = of_phases.filter_map(|pass| Some(pass.ms?.median)).collect();
             (!times.is_empty()).then(|| times.iter().sum())
         };
@@ -280,7 +282,7 @@ impl Times {
             find_ms: sum(&[Phase::Find]),
             derivatives_ms: sum(&[Phase::Derivatives]),
             geometry_ms: sum(&[Phase::Prepass, Phase::Fill, Phase::Find, Phase::Derivatives]),
-            shade_ms: sum(&[Phase::Shade]),
+            shade_ms: sum(&[Phase::Lights, Phase::Shade]),
             frame_ms: result.frame_ms.map(|frame| frame.median),
         }
     }
@@ -306,15 +308,36 @@ pub(crate) struct Sizes {
     pub peak_mib: Option<f64>,
 }
 
-/// What the paper's totals leave out.
-const NOT_IN_TOTAL: [&str; 3] = ["radiance", "cache entries", "cache locks"];
+/// Whether the paper's totals count it: they leave out the radiance and the memoization cache.
+fn is_in_total(buffer: &Buffer) -> bool {
+    buffer.role.is_some_and(|role| match role {
+        BufferRole::Targets | BufferRole::MemoizationCache => false,
+        BufferRole::Surfaces
+        | BufferRole::Depth
+        | BufferRole::Visibility
+        | BufferRole::SampleKeys
+        | BufferRole::RasterQueues
+        | BufferRole::SurfaceListHeads
+        | BufferRole::SurfaceListNodes
+        | BufferRole::Claims
+        | BufferRole::Triangles
+        | BufferRole::TriangleSets
+        | BufferRole::Lights
+        | BufferRole::Counters
+        | BufferRole::Scene
+        | BufferRole::Constants
+        | BufferRole::Shared
+        | BufferRole::Transparency
+        | BufferRole::Filters => true,
+    })
+}
 
 impl Sizes {
     pub fn of(result: &RunResult) -> Sizes {
         let Some(memory) = &result.memory else { return Sizes::default() };
         let mib = |bytes: u64| bytes as f64 / MIB;
-        let records = memory.buffers.iter().find(|buffer| part(&buffer.name) == "triangle buffer");
-        let total = memory.buffers.iter().filter(|buffer| !NOT_IN_TOTAL.contains(&part(&buffer.name)));
+        let records = of_role(&memory.buffers, BufferRole::Triangles);
+        let total = memory.buffers.iter().filter(|buffer| is_in_total(buffer));
         let total_mib = mib(total.map(|buffer| buffer.bytes).sum());
         let triangle_buffer_mib = records.map(|records| mib(records.bytes));
         let needed_mib = triangle_buffer_mib.map(|allocated| allocated * share_needed(result));
@@ -460,24 +483,24 @@ mod tests {
 
     #[test]
     fn times_and_sizes_are_told_apart() {
-        let pass = |name: &str, ms: f64| serde_json::json!({"name": name, "ms": {"median": ms, "min": ms, "max": ms}});
-        let buffer = |name: &str, mib: u64| serde_json::json!({"name": name, "bytes": mib << 20});
+        let pass = |name: &str, role: &str, ms: f64| serde_json::json!({"name": name, "role": role, "ms": {"median": ms, "min": ms, "max": ms}});
+        let buffer = |name: &str, role: &str, mib: u64| serde_json::json!({"name": name, "role": role, "bytes": mib << 20});
         let mut result = RunResult::without_figures("dais", Status::Ok, "");
         result.passes = serde_json::from_value(serde_json::json!([
-            pass("shared/rsm", 64.0),
-            pass("dais/clear cache", 1.0),
-            pass("dais/depth", 2.0),
-            pass("dais/fill", 4.0),
-            pass("dais/size", 8.0),
-            pass("dais/derivatives", 16.0),
-            pass("dais/shade", 32.0),
-            pass("present/tonemap", 128.0),
+            pass("shared/rsm", "shared", 64.0),
+            pass("dais/clear cache", "geometry", 1.0),
+            pass("dais/depth", "depth-prepass", 2.0),
+            pass("dais/fill", "geometry", 4.0),
+            pass("dais/size", "triangle-selection", 8.0),
+            pass("dais/derivatives", "derivatives", 16.0),
+            pass("dais/shade", "shading", 32.0),
+            pass("present/tonemap", "present", 128.0),
         ]))
         .expect("passes");
         result.memory = serde_json::from_value(serde_json::json!({
             "technique_bytes": 15 << 20, "peak_bytes": 9 << 20,
-            "buffers": [buffer("dais/depth", 1), buffer("dais/triangle buffer", 2), buffer("dais/radiance", 4),
-                buffer("dais/cache entries", 8)],
+            "buffers": [buffer("dais/depth", "depth", 1), buffer("dais/triangle buffer", "triangles", 2), buffer("dais/radiance", "targets", 4),
+                buffer("dais/cache entries", "memoization-cache", 8)],
         }))
         .ok();
         result.counters.insert("triangles_needed".into(), 5.into());
@@ -499,6 +522,8 @@ mod tests {
         );
         assert_eq!((sizes.triangle_buffer_mib, sizes.triangle_buffer_needed_mib), (Some(2.0), Some(0.5)));
         assert_eq!((sizes.triangles_stored, sizes.total_without_room_mib), (Some(5), Some(1.5)));
+        let renamed = crate::kit::phases::tests::renamed(&result);
+        assert_eq!((Times::of(&renamed), Sizes::of(&renamed)), (times, sizes), "names are for people");
     }
 
     #[test]

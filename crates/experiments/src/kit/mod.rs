@@ -6,7 +6,7 @@ mod experiment;
 mod filters;
 mod options;
 mod paper;
-mod phases;
+pub(crate) mod phases;
 mod pictures;
 mod table;
 mod text;
@@ -23,7 +23,7 @@ pub(crate) use paper::{
     FULL_HD_PX, Header, MIB, PaperFigures, PaperRecord, PaperWords, paper_data, stand_in,
 };
 pub use phases::Phase;
-pub(crate) use phases::{owner_and_stage, part, phase};
+pub(crate) use phases::{of_role, phase};
 pub use pictures::pictures_of;
 pub(crate) use table::{Row, Table, labelled, run_of};
 pub(crate) use text::{broken_off, counter, notes_text, reasons_text};

@@ -4,6 +4,7 @@
 //! Every figure is what the allocator took for an image or buffer, and stands beside the bytes that its formats alone
 //! would take: the difference is the device's granularity.
 
+use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
 use afterlight_graph::gpu::vk;
@@ -192,10 +193,17 @@ struct Column {
     paper: Option<Paper>,
     /// Whether the layout is the paper's, so that the figures must agree.
     comparable: bool,
+    /// Bytes a sample of the images of its G-buffer, in the order in which the technique declares them; none for lists.
+    surface_bytes: &'static [u64],
     /// Bytes of a depth sample, as the device stores the format.
     depth_bytes: u64,
     note: String,
 }
+
+/// Base colour with metalness, normal, roughness with occlusion and two bytes that align them.
+const PADDED_BYTES: &[u64] = &[4, 4, 4];
+/// Base colour with metalness, normal, roughness: what `deferred` stores.
+const PACKED_BYTES: &[u64] = &[4, 4, 1];
 
 /// An image or buffer beside what its format alone takes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -351,6 +359,7 @@ fn columns(base: &Renderer, sample_counts: &[u32]) -> Result<Vec<Column>, LabErr
             setup: Setup::new("none", 1, "deferred-ssaa", &[])?,
             paper: paper(PaperLayout::None, 1),
             comparable: true,
+            surface_bytes: PADDED_BYTES,
             depth_bytes: 4,
             note: "the images of deferred-ssaa at one sample: base colour 3 bytes and metalness 1, normal 4, roughness 1, occlusion 1, 2 unused: the paper's content and padding".to_owned(),
         },
@@ -358,6 +367,7 @@ fn columns(base: &Renderer, sample_counts: &[u32]) -> Result<Vec<Column>, LabErr
             setup: Setup::new("none (deferred)", 1, "deferred", &[])?,
             paper: paper(PaperLayout::None, 1),
             comparable: false,
+            surface_bytes: PACKED_BYTES,
             depth_bytes: 4,
             note: "the technique `deferred`: 9 bytes (base colour 3, metalness 1, normal 4, roughness 1) instead of the paper's 12: no occlusion (1 byte), no padding (2)".to_owned(),
         },
@@ -367,6 +377,7 @@ fn columns(base: &Renderer, sample_counts: &[u32]) -> Result<Vec<Column>, LabErr
             setup: Setup::new(format!("MSAA {samples}x"), samples, "deferred-ssaa", &[])?,
             paper: paper(PaperLayout::Msaa, samples),
             comparable: true,
+            surface_bytes: PADDED_BYTES,
             depth_bytes: 4,
             note: format!("deferred-ssaa: {PAPER_SAMPLE_BYTES} bytes a sample, depth 4"),
         });
@@ -389,6 +400,7 @@ fn columns(base: &Renderer, sample_counts: &[u32]) -> Result<Vec<Column>, LabErr
                     paper: blocks.paper(samples),
                     // What a view uses is the view's: the paper's scene is another.
                     comparable: comparable && blocks != Blocks::Used,
+                    surface_bytes: &[],
                     depth_bytes,
                     note: list_note(comparable, depth_bytes, blocks),
                 });
@@ -463,6 +475,7 @@ struct Sizes {
     pixels: u64,
     /// Samples a pixel that are rasterised.
     samples: u64,
+    surface_bytes: &'static [u64],
     depth_bytes: u64,
     /// Dynamic blocks.
     blocks: u64,
@@ -473,24 +486,38 @@ struct Sizes {
     tile_jobs: u64,
 }
 
-/// What an image or buffer of a technique is, and the bytes that its format takes; none for what the table does not know.
-fn part(name: &str, sizes: &Sizes) -> Option<(What, u64)> {
+/// What images and buffers of a role are, and the bytes that their formats take, in the order in which techniques declare them;
+/// none for what the table does not know.
+fn layout(role: BufferRole, sizes: &Sizes) -> Option<(What, Vec<u64>)> {
     let all_samples = sizes.pixels * sizes.samples;
-    Some(match name.split_once('/')? {
-        (_, "base color" | "normal") => (What::GBuffer, all_samples * 4),
-        ("deferred", "roughness") => (What::GBuffer, sizes.pixels),
-        (_, "roughness") => (What::GBuffer, all_samples * 4),
-        (_, "depth") => (What::ZBuffer, all_samples * sizes.depth_bytes),
-        (_, "ids") => (What::Visibility, all_samples * 4),
-        (_, "sample keys") => (What::Visibility, all_samples * 8),
-        (_, "large triangles") => (What::Visibility, sizes.large_triangles * 4),
-        (_, "tile jobs") => (What::Visibility, sizes.tile_jobs * 8),
-        (_, "large count" | "job count") => (What::Visibility, 8),
-        (_, "blocks") => (What::GBuffer, (sizes.pixels + sizes.blocks).div_ceil(2) * sizes.pair_bytes),
-        (_, "block count") => (What::GBuffer, 8),
-        (_, "claims") => (What::Claims, sizes.pixels.div_ceil(4) * 4),
-        (_, "accumulation" | "radiance") => (What::Output, sizes.pixels * 8),
-        _ => return None,
+    Some(match role {
+        BufferRole::Surfaces => {
+            (What::GBuffer, sizes.surface_bytes.iter().map(|bytes| all_samples * bytes).collect())
+        }
+        BufferRole::Depth => (What::ZBuffer, vec![all_samples * sizes.depth_bytes]),
+        BufferRole::Visibility => (What::Visibility, vec![all_samples * 4]),
+        BufferRole::SampleKeys => (What::Visibility, vec![all_samples * 8]),
+        // Large triangles, tile jobs, and a count of each.
+        BufferRole::RasterQueues => {
+            (What::Visibility, vec![sizes.large_triangles * 4, sizes.tile_jobs * 8, 8, 8])
+        }
+        // Blocks, and their count.
+        BufferRole::SurfaceListNodes => {
+            (What::GBuffer, vec![(sizes.pixels + sizes.blocks).div_ceil(2) * sizes.pair_bytes, 8])
+        }
+        BufferRole::Claims => (What::Claims, vec![sizes.pixels.div_ceil(4) * 4]),
+        BufferRole::Targets => (What::Output, vec![sizes.pixels * 8]),
+        BufferRole::SurfaceListHeads
+        | BufferRole::Triangles
+        | BufferRole::TriangleSets
+        | BufferRole::MemoizationCache
+        | BufferRole::Lights
+        | BufferRole::Counters
+        | BufferRole::Scene
+        | BufferRole::Constants
+        | BufferRole::Shared
+        | BufferRole::Transparency
+        | BufferRole::Filters => return None,
     })
 }
 
@@ -507,6 +534,7 @@ fn resources(column: &Column, result: &RunResult, pixels: u64) -> Vec<Resource> 
     let sizes = Sizes {
         pixels,
         samples: rasterised_samples(column, result, blocks),
+        surface_bytes: column.surface_bytes,
         depth_bytes: column.depth_bytes,
         blocks,
         // 10 bytes of content each with a pointer of 4, and 4 of distance.
@@ -514,11 +542,17 @@ fn resources(column: &Column, result: &RunResult, pixels: u64) -> Vec<Resource> 
         large_triangles: capacity("large_triangles"),
         tile_jobs: capacity("tile_jobs"),
     };
+    let buffers = result.memory.iter().flat_map(|memory| &memory.buffers);
+    let mut seen: BTreeMap<BufferRole, usize> = BTreeMap::new();
     let resource = |buffer: &Buffer| {
-        let (what, layout_bytes) = part(&buffer.name, &sizes)?;
-        Some(Resource { name: buffer.name.clone(), bytes: buffer.bytes, layout_bytes, what })
+        let role = buffer.role?;
+        let (what, layouts) = layout(role, &sizes)?;
+        let place = seen.entry(role).or_default();
+        let layout_bytes = layouts.get(*place).copied();
+        *place += 1;
+        Some(Resource { name: buffer.name.clone(), bytes: buffer.bytes, layout_bytes: layout_bytes?, what })
     };
-    result.memory.iter().flat_map(|memory| &memory.buffers).filter_map(resource).collect()
+    buffers.filter_map(resource).collect()
 }
 
 fn cells(column: &Column, result: &RunResult, pixels: u64) -> Vec<Cell> {
@@ -756,6 +790,7 @@ mod tests {
             setup: Setup::new("list", 4, "gbuffer-list", &[("position", "depth")]).expect("known"),
             paper: blocks.paper(4),
             comparable: true,
+            surface_bytes: &[],
             depth_bytes,
             note: String::new(),
         }
@@ -767,12 +802,12 @@ mod tests {
         result.params.insert("position".into(), "depth".into());
         result.counters.insert("blocks_capacity".into(), blocks.into());
         let buffers = [
-            ("gbuffer-list/blocks", (pixels + blocks).div_ceil(2) * 28 + extra),
-            ("gbuffer-list/block count", 8),
-            ("gbuffer-list/depth", pixels * 4 * depth_bytes),
-            ("gbuffer-list/radiance", pixels * 8),
+            ("gbuffer-list/blocks", BufferRole::SurfaceListNodes, (pixels + blocks).div_ceil(2) * 28 + extra),
+            ("gbuffer-list/block count", BufferRole::SurfaceListNodes, 8),
+            ("gbuffer-list/depth", BufferRole::Depth, pixels * 4 * depth_bytes),
+            ("gbuffer-list/radiance", BufferRole::Targets, pixels * 8),
         ]
-        .map(|(name, bytes)| Buffer { name: name.into(), role: None, bytes })
+        .map(|(name, role, bytes)| Buffer { name: name.into(), role: Some(role), bytes })
         .to_vec();
         result.memory = Some(Memory { technique_bytes: 0, peak_bytes: 0, buffers });
         result
@@ -842,20 +877,33 @@ mod tests {
         let sizes = Sizes {
             pixels: 100,
             samples: 4,
+            surface_bytes: PACKED_BYTES,
             depth_bytes: 4,
             blocks: 3,
             pair_bytes: 36,
             large_triangles: 7,
             tile_jobs: 5,
         };
-        let of = |name: &str| part(name, &sizes);
-        assert_eq!(of("gbuffer-list/sample keys"), Some((What::Visibility, 3200)));
-        assert_eq!(of("gbuffer-list/large triangles"), Some((What::Visibility, 28)));
-        assert_eq!(of("gbuffer-list/tile jobs"), Some((What::Visibility, 40)));
-        assert_eq!(of("gbuffer-list/blocks"), Some((What::GBuffer, 52 * 36)));
-        assert_eq!(of("deferred/roughness"), Some((What::GBuffer, 100)));
-        assert_eq!(of("deferred-ssaa/roughness"), Some((What::GBuffer, 1600)));
-        assert_eq!(of("bench/unknown"), None);
+        let of = |role: BufferRole| layout(role, &sizes);
+        assert_eq!(of(BufferRole::SampleKeys), Some((What::Visibility, vec![3200])));
+        assert_eq!(of(BufferRole::RasterQueues), Some((What::Visibility, vec![28, 40, 8, 8])));
+        assert_eq!(of(BufferRole::SurfaceListNodes), Some((What::GBuffer, vec![52 * 36, 8])));
+        assert_eq!(of(BufferRole::Surfaces), Some((What::GBuffer, vec![1600, 1600, 400])));
+        assert_eq!(of(BufferRole::Lights), None);
+    }
+
+    #[test]
+    fn names_are_for_people() {
+        let column = column(Blocks::Max, 4);
+        let result = result(PIXELS, 3 * PIXELS, 4, 0);
+        let told = |result: &RunResult| {
+            let mut cells = cells(&column, result, PIXELS);
+            for resource in cells.iter_mut().flat_map(|cell| &mut cell.resources) {
+                resource.name.clear();
+            }
+            cells
+        };
+        assert_eq!(told(&crate::kit::phases::tests::renamed(&result)), told(&result));
     }
 
     #[test]
