@@ -71,17 +71,6 @@ pub enum DrawCall<'a> {
         /// Distance between commands in bytes.
         stride: u32,
     },
-    /// `count` indirect calls (`VkDrawIndirectCommand`).
-    Indirect {
-        /// Buffer of the commands.
-        buffer: &'a BufferHandle,
-        /// Offset of the first command in bytes.
-        offset: u64,
-        /// Number of commands.
-        count: u32,
-        /// Distance between commands in bytes.
-        stride: u32,
-    },
 }
 
 impl DrawCall<'_> {

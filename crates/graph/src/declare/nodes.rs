@@ -101,12 +101,6 @@ pub(crate) enum CallNode {
         vertex_offset: i32,
         first_instance: u32,
     },
-    Indirect {
-        buffer: ResourceId,
-        offset: u64,
-        count: u32,
-        stride: u32,
-    },
     IndexedIndirect {
         buffer: ResourceId,
         offset: u64,

@@ -191,9 +191,6 @@ impl RasterPass<'_> {
             DrawCall::Indexed { indices, instances, first_index, vertex_offset, first_instance } => {
                 CallNode::Indexed { indices, instances, first_index, vertex_offset, first_instance }
             }
-            DrawCall::Indirect { buffer, offset, count, stride } => {
-                CallNode::Indirect { buffer: own(graph, buffer), offset, count, stride }
-            }
             DrawCall::IndexedIndirect { buffer, offset, count, stride } => {
                 CallNode::IndexedIndirect { buffer: own(graph, buffer), offset, count, stride }
             }

@@ -67,12 +67,6 @@ pub(super) enum BoundCall {
         vertex_offset: i32,
         first_instance: u32,
     },
-    Indirect {
-        buffer: gpu::Buffer,
-        offset: u64,
-        count: u32,
-        stride: u32,
-    },
     IndexedIndirect {
         buffer: gpu::Buffer,
         offset: u64,

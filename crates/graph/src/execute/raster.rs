@@ -122,9 +122,6 @@ impl Builder<'_> {
             CallNode::Indexed { indices, instances, first_index, vertex_offset, first_instance } => {
                 BoundCall::Indexed { indices, instances, first_index, vertex_offset, first_instance }
             }
-            CallNode::Indirect { buffer, offset, count, stride } => {
-                BoundCall::Indirect { buffer: self.buffer(buffer).clone(), offset, count, stride }
-            }
             CallNode::IndexedIndirect { buffer, offset, count, stride } => {
                 BoundCall::IndexedIndirect { buffer: self.buffer(buffer).clone(), offset, count, stride }
             }

@@ -149,9 +149,6 @@ impl DrawCommand {
             BoundCall::Indexed { indices, instances, first_index, vertex_offset, first_instance } => {
                 encoder.draw_indexed(*indices, *instances, *first_index, *vertex_offset, *first_instance);
             }
-            BoundCall::Indirect { buffer, offset, count, stride } => {
-                encoder.draw_indirect(buffer, *offset, *count, *stride);
-            }
             BoundCall::IndexedIndirect { buffer, offset, count, stride } => {
                 encoder.draw_indexed_indirect(buffer, *offset, *count, *stride);
             }

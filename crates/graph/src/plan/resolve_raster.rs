@@ -215,9 +215,7 @@ impl<'a> Resolver<'a> {
             }
             let indirect = match draw.call {
                 CallNode::Direct { .. } | CallNode::Indexed { .. } => [None, None],
-                CallNode::Indirect { buffer, .. } | CallNode::IndexedIndirect { buffer, .. } => {
-                    [Some(buffer), None]
-                }
+                CallNode::IndexedIndirect { buffer, .. } => [Some(buffer), None],
                 CallNode::IndexedIndirectCount { buffer, count_buffer, .. } => {
                     [Some(buffer), Some(count_buffer)]
                 }
@@ -319,7 +317,7 @@ impl<'a> Resolver<'a> {
                 format!("{}, the layout's streams", state.layout.streams.len()),
             ));
         }
-        let indexed = !matches!(draw.call, CallNode::Direct { .. } | CallNode::Indirect { .. });
+        let indexed = !matches!(draw.call, CallNode::Direct { .. });
         if indexed && draw.index_buffer.is_none() {
             return Err(self.attachment_error(
                 "index buffer of an indexed draw",
