@@ -570,15 +570,6 @@ impl Encoder {
         }
     }
 
-    /// Draws `count` times with arguments from `buffer` (`VkDrawIndirectCommand`), `stride` bytes apart.
-    pub fn draw_indirect(&mut self, buffer: &Buffer, offset: u64, count: u32, stride: u32) {
-        self.for_each_batch(offset, count, stride, |raw, commands, offset, count| {
-            // SAFETY: as in `barriers`.
-            unsafe { raw.cmd_draw_indirect(commands, buffer.0.raw, offset, count, stride) };
-        });
-        self.keep_buffer(buffer);
-    }
-
     /// Draws `count` times with arguments from `buffer` (`VkDrawIndexedIndirectCommand`), `stride` bytes apart.
     pub fn draw_indexed_indirect(&mut self, buffer: &Buffer, offset: u64, count: u32, stride: u32) {
         self.for_each_batch(offset, count, stride, |raw, commands, offset, count| {
@@ -652,40 +643,14 @@ impl Encoder {
 
     /// Clears the stencil of the current attachment within `rect`.
     pub fn clear_stencil(&mut self, value: u32, rect: vk::Rect2D, layers: u32) {
-        let clear =
-            vk::ClearValue { depth_stencil: vk::ClearDepthStencilValue { depth: 0.0, stencil: value } };
-        self.clear_attachment(vk::ImageAspectFlags::STENCIL, 0, clear, rect, layers);
-    }
-
-    /// Clears the depth of the current attachment within `rect`.
-    pub fn clear_depth(&mut self, depth_ndc: f32, rect: vk::Rect2D, layers: u32) {
-        let clear =
-            vk::ClearValue { depth_stencil: vk::ClearDepthStencilValue { depth: depth_ndc, stencil: 0 } };
-        self.clear_attachment(vk::ImageAspectFlags::DEPTH, 0, clear, rect, layers);
-    }
-
-    /// Clears a current colour attachment within `rect`.
-    pub fn clear_color_attachment(
-        &mut self,
-        location: u32,
-        value: ClearColor,
-        rect: vk::Rect2D,
-        layers: u32,
-    ) {
-        let clear = vk::ClearValue { color: value.raw() };
-        self.clear_attachment(vk::ImageAspectFlags::COLOR, location, clear, rect, layers);
-    }
-
-    fn clear_attachment(
-        &mut self,
-        aspect: vk::ImageAspectFlags,
-        location: u32,
-        clear_value: vk::ClearValue,
-        rect: vk::Rect2D,
-        layers: u32,
-    ) {
         assert!(self.is_rendering, "attachments are cleared within rendering");
-        let clear = vk::ClearAttachment { aspect_mask: aspect, color_attachment: location, clear_value };
+        let clear = vk::ClearAttachment {
+            aspect_mask: vk::ImageAspectFlags::STENCIL,
+            color_attachment: 0,
+            clear_value: vk::ClearValue {
+                depth_stencil: vk::ClearDepthStencilValue { depth: 0.0, stencil: value },
+            },
+        };
         let rect = vk::ClearRect { rect, base_array_layer: 0, layer_count: layers };
         // SAFETY: as in `barriers`; rendering has begun.
         unsafe { self.raw().cmd_clear_attachments(self.commands, &[clear], &[rect]) };
@@ -724,15 +689,6 @@ impl Encoder {
         self.keep_image(to);
     }
 
-    /// Copies from a buffer to an image in `TRANSFER_DST_OPTIMAL`.
-    pub fn copy_buffer_to_image(&mut self, from: &Buffer, to: &Image, regions: &[vk::BufferImageCopy]) {
-        let dst = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
-        // SAFETY: as in `barriers`.
-        unsafe { self.raw().cmd_copy_buffer_to_image(self.commands, from.0.raw, to.0.raw, dst, regions) };
-        self.keep_buffer(from);
-        self.keep_image(to);
-    }
-
     /// Copies from an image in `TRANSFER_SRC_OPTIMAL` to a buffer.
     pub fn copy_image_to_buffer(&mut self, from: &Image, to: &Buffer, regions: &[vk::BufferImageCopy]) {
         let src = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;
@@ -742,75 +698,11 @@ impl Encoder {
         self.keep_buffer(to);
     }
 
-    /// Copies with scaling and change of format, from `TRANSFER_SRC_OPTIMAL` to `TRANSFER_DST_OPTIMAL`.
-    pub fn blit_image(&mut self, from: &Image, to: &Image, regions: &[vk::ImageBlit], filter: vk::Filter) {
-        let (src, dst) = (vk::ImageLayout::TRANSFER_SRC_OPTIMAL, vk::ImageLayout::TRANSFER_DST_OPTIMAL);
-        // SAFETY: as in `barriers`.
-        unsafe { self.raw().cmd_blit_image(self.commands, from.0.raw, src, to.0.raw, dst, regions, filter) };
-        self.keep_image(from);
-        self.keep_image(to);
-    }
-
-    /// Averages the samples of `from` (in `TRANSFER_SRC_OPTIMAL`) into `to` (in `TRANSFER_DST_OPTIMAL`).
-    pub fn resolve_image(&mut self, from: &Image, to: &Image, regions: &[vk::ImageResolve]) {
-        let (src, dst) = (vk::ImageLayout::TRANSFER_SRC_OPTIMAL, vk::ImageLayout::TRANSFER_DST_OPTIMAL);
-        // SAFETY: as in `barriers`.
-        unsafe { self.raw().cmd_resolve_image(self.commands, from.0.raw, src, to.0.raw, dst, regions) };
-        self.keep_image(from);
-        self.keep_image(to);
-    }
-
     /// Fills the whole of a buffer with a word.
     pub fn fill_buffer(&mut self, buffer: &Buffer, value: u32) {
         // SAFETY: as in `barriers`; buffers are multiples of 16 bytes on the device.
         unsafe { self.raw().cmd_fill_buffer(self.commands, buffer.0.raw, 0, vk::WHOLE_SIZE, value) };
         self.keep_buffer(buffer);
-    }
-
-    /// Fills a range of a buffer with a word; offset and length are multiples of 4 bytes.
-    ///
-    /// # Errors
-    /// [`GpuError::OutOfRange`] with the buffer's name.
-    pub fn fill_buffer_range(
-        &mut self,
-        buffer: &Buffer,
-        offset: u64,
-        bytes: u64,
-        value: u32,
-    ) -> Result<(), GpuError> {
-        assert!(
-            offset.is_multiple_of(4) && bytes.is_multiple_of(4),
-            "{}: fill of {bytes} bytes at {offset}",
-            buffer.name()
-        );
-        buffer.check_range(offset, bytes)?;
-        if bytes > 0 {
-            // SAFETY: as in `barriers`; the range has been checked.
-            unsafe { self.raw().cmd_fill_buffer(self.commands, buffer.0.raw, offset, bytes, value) };
-            self.keep_buffer(buffer);
-        }
-        Ok(())
-    }
-
-    /// Writes up to 65,536 bytes (a multiple of 4) into a buffer, in order with the other commands.
-    ///
-    /// # Errors
-    /// [`GpuError::OutOfRange`] with the buffer's name; [`GpuError::TooLarge`].
-    pub fn update_buffer(&mut self, buffer: &Buffer, offset: u64, data: &[u8]) -> Result<(), GpuError> {
-        assert!(
-            offset.is_multiple_of(4) && data.len().is_multiple_of(4),
-            "{}: update of {} bytes at {offset}",
-            buffer.name(),
-            data.len()
-        );
-        buffer.check_range(offset, data.len() as u64)?;
-        crate::memory::check_limit(buffer.name(), "bytes of an inline update", data.len() as u64, 65_536)?;
-        if !data.is_empty() {
-            // SAFETY: as in `barriers`; the range has been checked.
-            unsafe { self.raw().cmd_update_buffer(self.commands, buffer.0.raw, offset, data) };
-            self.keep_buffer(buffer);
-        }
-        Ok(())
     }
 
     /// Clears colour images outside a pass; `layout` is `TRANSFER_DST_OPTIMAL` or `GENERAL`.
@@ -824,23 +716,6 @@ impl Encoder {
         // SAFETY: as in `barriers`.
         unsafe {
             self.raw().cmd_clear_color_image(self.commands, image.0.raw, layout, &value.raw(), &[range]);
-        }
-        self.keep_image(image);
-    }
-
-    /// Clears depth and stencil images outside a pass; `layout` is `TRANSFER_DST_OPTIMAL` or `GENERAL`.
-    pub fn clear_depth_stencil_image(
-        &mut self,
-        image: &Image,
-        layout: vk::ImageLayout,
-        depth_ndc: f32,
-        stencil: u32,
-        range: vk::ImageSubresourceRange,
-    ) {
-        let value = vk::ClearDepthStencilValue { depth: depth_ndc, stencil };
-        // SAFETY: as in `barriers`.
-        unsafe {
-            self.raw().cmd_clear_depth_stencil_image(self.commands, image.0.raw, layout, &value, &[range]);
         }
         self.keep_image(image);
     }

@@ -1,0 +1,190 @@
+//! Reading kept and imported resources after a frame.
+
+use afterlight_gpu::{self as gpu, GpuError, vk};
+
+use super::Executor;
+use super::builder::image_to_buffer;
+use super::resources::Physical;
+use crate::declare::ResourceId;
+use crate::error::GraphError;
+use crate::plan::{Plan, aspects};
+
+const ANY_WRITE: gpu::Access =
+    gpu::Access { stages: vk::PipelineStageFlags2::ALL_COMMANDS, access: vk::AccessFlags2::MEMORY_WRITE };
+const ANY: gpu::Access = gpu::Access {
+    stages: vk::PipelineStageFlags2::ALL_COMMANDS,
+    access: vk::AccessFlags2::from_raw(
+        vk::AccessFlags2::MEMORY_READ.as_raw() | vk::AccessFlags2::MEMORY_WRITE.as_raw(),
+    ),
+};
+const COPY_READ: gpu::Access =
+    gpu::Access { stages: vk::PipelineStageFlags2::ALL_TRANSFER, access: vk::AccessFlags2::TRANSFER_READ };
+
+/// Names a resource of a plan: by its name or by its id.
+pub trait ResourceKey {
+    /// Returns the resource, if the plan has it.
+    fn find(&self, plan: &Plan) -> Option<ResourceId>;
+    /// Returns how an error message calls it.
+    fn label(&self) -> String;
+}
+
+impl ResourceKey for ResourceId {
+    fn find(&self, plan: &Plan) -> Option<ResourceId> {
+        ((self.0 as usize) < plan.resources.len()).then_some(*self)
+    }
+
+    fn label(&self) -> String {
+        format!("#{}", self.0)
+    }
+}
+
+impl ResourceKey for &str {
+    fn find(&self, plan: &Plan) -> Option<ResourceId> {
+        plan.resource(self)
+    }
+
+    fn label(&self) -> String {
+        (*self).to_owned()
+    }
+}
+
+impl Executor {
+    pub(super) fn find(&self, key: &impl ResourceKey) -> Result<ResourceId, GraphError> {
+        let kept = |found| {
+            let kept = self.plan.resources.iter().filter(|resource| resource.kept || resource.imported);
+            let names: Vec<&str> = kept.map(|resource| resource.name.as_str()).collect();
+            GraphError::NotReadable { name: key.label(), found, expected: names.join(", ") }
+        };
+        let id = key.find(&self.plan).ok_or_else(|| kept("no resource of that name"))?;
+        let resource = &self.plan.resources[id.0 as usize];
+        if !resource.kept && !resource.imported {
+            return Err(kept("not kept: its memory may hold another resource"));
+        }
+        if matches!(self.physical[id.0 as usize], Physical::Unused) {
+            return Err(kept("used by no pass"));
+        }
+        Ok(id)
+    }
+
+    fn not_readable(&self, key: &impl ResourceKey, found: &'static str, expected: &str) -> GraphError {
+        GraphError::NotReadable { name: key.label(), found, expected: expected.to_owned() }
+    }
+
+    /// Returns a buffer of the frame that was kept or imported.
+    ///
+    /// # Errors
+    /// No such resource, or one that is not kept.
+    pub fn buffer(&self, key: impl ResourceKey) -> Result<&gpu::Buffer, GraphError> {
+        let id = self.find(&key)?;
+        match &self.physical[id.0 as usize] {
+            Physical::Buffer(buffer) => Ok(buffer),
+            _ => Err(self.not_readable(&key, "an image", "a buffer")),
+        }
+    }
+
+    /// Returns an image of the frame that was kept or imported.
+    ///
+    /// # Errors
+    /// No such resource, or one that is not kept.
+    pub fn image(&self, key: impl ResourceKey) -> Result<&gpu::Image, GraphError> {
+        let id = self.find(&key)?;
+        match &self.physical[id.0 as usize] {
+            Physical::Image(image) => Ok(image),
+            _ => Err(self.not_readable(&key, "a buffer", "an image")),
+        }
+    }
+
+    fn read_back(
+        &self,
+        bytes: u64,
+        record: impl FnOnce(&mut gpu::Encoder, &gpu::Buffer) -> Result<(), GpuError>,
+    ) -> Result<Vec<u8>, GraphError> {
+        let target = self.device.create_buffer(&gpu::BufferDesc {
+            name: "read back",
+            bytes,
+            usage: vk::BufferUsageFlags::TRANSFER_DST,
+            memory: gpu::MemoryKind::Readback,
+        })?;
+        let mut encoder = self.device.encoder()?;
+        record(&mut encoder, &target)?;
+        self.device.submit(encoder)?;
+        let mut out = vec![0; usize::try_from(bytes).unwrap_or(usize::MAX)];
+        target.read(0, &mut out)?;
+        Ok(out)
+    }
+
+    /// Reads a kept or imported buffer back, whole.
+    ///
+    /// # Errors
+    /// No such resource, one that is not kept, or no memory.
+    pub fn read_buffer(&self, key: impl ResourceKey) -> Result<Vec<u8>, GraphError> {
+        let buffer = self.buffer(key)?;
+        self.read_back(buffer.bytes(), |encoder, target| {
+            let all = gpu::MemoryBarrier { before: ANY_WRITE, after: COPY_READ };
+            encoder.barriers(&[all], &[], &[]);
+            encoder.copy_buffer(buffer, 0, target, 0, buffer.bytes())
+        })
+    }
+
+    /// Reads mip level 0 of a kept or imported image back: rows from top to bottom, layer after layer, tightly packed in
+    /// the image's format; of a depth-stencil image the depth.
+    ///
+    /// # Errors
+    /// No such resource, one that is not kept or has several samples, or no memory.
+    pub fn read_image(&self, key: impl ResourceKey) -> Result<Vec<u8>, GraphError> {
+        let id = self.find(&key)?;
+        let image = match &self.physical[id.0 as usize] {
+            Physical::Image(image) => image,
+            _ => return Err(self.not_readable(&key, "a buffer", "an image")),
+        };
+        if image.samples() > 1 {
+            return Err(self.not_readable(
+                &key,
+                "an image of several samples",
+                "one sample (resolve it first)",
+            ));
+        }
+        let Some(info) = gpu::format_info(image.format()) else {
+            return Err(self.not_readable(&key, "an image of a format of unknown size", "a known format"));
+        };
+        let planned = &self.plan.resources[id.0 as usize];
+        let layer_bytes = info.level_bytes(image.extent()[0], image.extent()[1]);
+        let full = aspects(image.format());
+        let copied =
+            if full.contains(vk::ImageAspectFlags::DEPTH) { vk::ImageAspectFlags::DEPTH } else { full };
+        let mut barriers = Vec::new();
+        let mut regions = Vec::new();
+        for layer in 0..image.layers() {
+            let layout =
+                planned.final_layouts.get((layer * image.mips()) as usize).copied().unwrap_or_default();
+            if layout == vk::ImageLayout::UNDEFINED {
+                return Err(self.not_readable(&key, "a layer that no pass has written", "a written image"));
+            }
+            barriers.push(gpu::ImageBarrier {
+                image,
+                range: vk::ImageSubresourceRange {
+                    aspect_mask: full,
+                    base_mip_level: 0,
+                    level_count: 1,
+                    base_array_layer: layer,
+                    layer_count: 1,
+                },
+                before: ANY_WRITE,
+                after: COPY_READ,
+                old_layout: layout,
+                new_layout: vk::ImageLayout::TRANSFER_SRC_OPTIMAL,
+            });
+            regions.push(image_to_buffer(image, copied, 0, layer, u64::from(layer) * layer_bytes));
+        }
+        self.read_back(layer_bytes * u64::from(image.layers()), |encoder, target| {
+            encoder.barriers(&[], &[], &barriers);
+            encoder.copy_image_to_buffer(image, target, &regions);
+            for barrier in &mut barriers {
+                std::mem::swap(&mut barrier.old_layout, &mut barrier.new_layout);
+                (barrier.before, barrier.after) = (COPY_READ, ANY);
+            }
+            encoder.barriers(&[], &[], &barriers);
+            Ok(())
+        })
+    }
+}

@@ -1,0 +1,84 @@
+//! Places of transient resources in heaps: those that live at different times share memory.
+
+use super::PlannedResource;
+use crate::declare::ResourceKind;
+
+/// Where a transient resource lies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Placement {
+    /// Index into [`Plan::heaps`].
+    pub heap: usize,
+    /// Offset in the heap in bytes.
+    pub offset: u64,
+}
+
+/// Memory that transient resources share.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PlannedHeap {
+    /// Size in bytes.
+    pub bytes: u64,
+    /// Alignment of the heap's start in bytes.
+    pub alignment: u64,
+    /// Memory types it may be of.
+    pub type_bits: u32,
+}
+
+/// Places resources: large ones first, each at the lowest offset that no resource alive at the same time holds. Images
+/// and buffers have heaps of their own, so that no granularity between them matters.
+pub(super) fn place(resources: &mut [PlannedResource]) -> Vec<PlannedHeap> {
+    let mut heaps: Vec<PlannedHeap> = Vec::new();
+    let mut keys: Vec<(u32, bool)> = Vec::new();
+    let mut order: Vec<usize> = (0..resources.len())
+        .filter(|index| resources[*index].lifetime.is_some() && !resources[*index].imported)
+        .collect();
+    order.sort_by_key(|index| (std::cmp::Reverse(resources[*index].need.bytes), *index));
+    for (placed, index) in order.iter().copied().enumerate() {
+        let resource = &resources[index];
+        let key = (resource.need.type_bits, matches!(resource.kind, ResourceKind::Image(_)));
+        let heap = keys.iter().position(|other| *other == key).unwrap_or_else(|| {
+            keys.push(key);
+            heaps.push(PlannedHeap { bytes: 0, alignment: 1, type_bits: key.0 });
+            heaps.len() - 1
+        });
+        let mut taken: Vec<(u64, u64)> = order[..placed]
+            .iter()
+            .map(|other| &resources[*other])
+            .filter(|other| {
+                other.placement.is_some_and(|place| place.heap == heap) && overlap(other, resource)
+            })
+            .filter_map(|other| Some((other.placement?.offset, other.placement?.offset + other.need.bytes)))
+            .collect();
+        taken.sort_unstable();
+        let mut offset = 0u64;
+        for (start, end) in taken {
+            if start >= offset + resource.need.bytes {
+                break;
+            }
+            offset = offset.max(end).next_multiple_of(resource.need.alignment);
+        }
+        let end = offset + resource.need.bytes;
+        heaps[heap].bytes = heaps[heap].bytes.max(end);
+        heaps[heap].alignment = heaps[heap].alignment.max(resource.need.alignment);
+        resources[index].placement = Some(Placement { heap, offset });
+    }
+    heaps
+}
+
+/// Whether two resources are alive at the same time.
+pub(super) fn overlap(a: &PlannedResource, b: &PlannedResource) -> bool {
+    match (a.lifetime, b.lifetime) {
+        (Some(a), Some(b)) => a.0 <= b.1 && b.0 <= a.1,
+        _ => false,
+    }
+}
+
+pub(super) fn shares_memory(a: &PlannedResource, b: &PlannedResource) -> bool {
+    match (a.placement, b.placement) {
+        (Some(place_a), Some(place_b)) => {
+            place_a.heap == place_b.heap
+                && place_a.offset < place_b.offset + b.need.bytes
+                && place_b.offset < place_a.offset + a.need.bytes
+        }
+        _ => false,
+    }
+}
