@@ -58,10 +58,13 @@ fn template(folder: &Path) -> Result<Vec<(String, String)>, Error> {
 
 /// Words of lower-case letters and digits, the first beginning with a letter, joined by single `-`.
 fn check_id(id: &str) -> Result<(), Error> {
-    let word = |word: &str| !word.is_empty() && word.bytes().all(|b| b.is_ascii_lowercase() || b.is_ascii_digit());
-    let sound = id.len() <= LONGEST_ID && id.split('-').all(word) && id.starts_with(|c: char| c.is_ascii_lowercase());
+    let word =
+        |word: &str| !word.is_empty() && word.bytes().all(|b| b.is_ascii_lowercase() || b.is_ascii_digit());
+    let sound =
+        id.len() <= LONGEST_ID && id.split('-').all(word) && id.starts_with(|c: char| c.is_ascii_lowercase());
     if !sound {
-        let expected = format!("lower-case words joined by `-`, at most {LONGEST_ID} letters (such as light-list)");
+        let expected =
+            format!("lower-case words joined by `-`, at most {LONGEST_ID} letters (such as light-list)");
         return Err(Error(format!("a technique's id: found `{id}`, expected {expected}")));
     }
     // The folder's name becomes a Rust module.
@@ -73,17 +76,20 @@ fn check_id(id: &str) -> Result<(), Error> {
 
 /// Keywords that would pass as ids.
 const KEYWORDS: &[&str] = &[
-    "abstract", "as", "async", "await", "become", "box", "break", "const", "continue", "crate", "do", "dyn", "else", "enum", "extern",
-    "false", "final", "fn", "for", "gen", "if", "impl", "in", "let", "loop", "macro", "match", "mod", "move", "mut", "override", "priv",
-    "pub", "ref", "return", "self", "static", "struct", "super", "trait", "true", "try", "type", "typeof", "unsafe", "unsized", "use",
-    "virtual", "where", "while", "yield",
+    "abstract", "as", "async", "await", "become", "box", "break", "const", "continue", "crate", "do", "dyn",
+    "else", "enum", "extern", "false", "final", "fn", "for", "gen", "if", "impl", "in", "let", "loop",
+    "macro", "match", "mod", "move", "mut", "override", "priv", "pub", "ref", "return", "self", "static",
+    "struct", "super", "trait", "true", "try", "type", "typeof", "unsafe", "unsized", "use", "virtual",
+    "where", "while", "yield",
 ];
 
 /// A title stands in a Rust literal, a table of Markdown and a page of HTML.
 fn check_title(title: &str) -> Result<(), Error> {
     let bad = title.chars().find(|c| c.is_control() || matches!(c, '"' | '\\' | '|' | '<' | '>' | '`'));
     match bad {
-        _ if title.trim().is_empty() => Err(Error("a technique's title: found nothing, expected a few words".into())),
+        _ if title.trim().is_empty() => {
+            Err(Error("a technique's title: found nothing, expected a few words".into()))
+        }
         Some(c) => Err(Error(format!("a technique's title: found {c:?} in `{title}`, expected plain words"))),
         None => Ok(()),
     }
@@ -109,8 +115,10 @@ mod tests {
         let template = root.path().join(TEMPLATE);
         fs::create_dir_all(&template).unwrap();
         fs::create_dir_all(root.path().join(TECHNIQUES)).unwrap();
-        fs::write(template.join("mod.rs.template"), "struct TechniqueType; // TECHNIQUE_ID, TECHNIQUE_TITLE").unwrap();
-        fs::write(template.join("technique_folder.frag.glsl"), "#include \"technique_folder/a.glsl\"").unwrap();
+        fs::write(template.join("mod.rs.template"), "struct TechniqueType; // TECHNIQUE_ID, TECHNIQUE_TITLE")
+            .unwrap();
+        fs::write(template.join("technique_folder.frag.glsl"), "#include \"technique_folder/a.glsl\"")
+            .unwrap();
         root
     }
 

@@ -31,7 +31,8 @@ pub fn check(root: &Path, table: &Table) -> Result<Vec<Broken>, Error> {
     for path in files(root, &|path| path.file_name().is_some_and(|name| name == "Cargo.toml"))? {
         manifests.extend(manifest(root, &path)?);
     }
-    let folder_of: BTreeMap<&str, &str> = manifests.iter().map(|m| (m.package.as_str(), m.folder.as_str())).collect();
+    let folder_of: BTreeMap<&str, &str> =
+        manifests.iter().map(|m| (m.package.as_str(), m.folder.as_str())).collect();
     let mut broken = Vec::new();
     for found in &manifests {
         let file = Path::new(&found.folder).join("Cargo.toml");
@@ -56,7 +57,11 @@ pub fn check(root: &Path, table: &Table) -> Result<Vec<Broken>, Error> {
 }
 
 fn list(folders: &[&str]) -> String {
-    if folders.is_empty() { "crates from outside the tree".into() } else { format!("{} and what these use", folders.join(", ")) }
+    if folders.is_empty() {
+        "crates from outside the tree".into()
+    } else {
+        format!("{} and what these use", folders.join(", "))
+    }
 }
 
 /// Reads a manifest; `None` where it holds no package.

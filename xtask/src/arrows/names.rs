@@ -14,15 +14,20 @@ pub fn check(root: &Path, table: &Table) -> Result<Vec<Broken>, Error> {
     let ids = ids(&root.join(table.names.techniques))?;
     let mut broken = Vec::new();
     for folder in table.names.silent {
-        for file in files(&root.join(folder), &|path| ["rs", "glsl", "txt"].iter().any(|e| has_extension(path, e)))? {
+        for file in
+            files(&root.join(folder), &|path| ["rs", "glsl", "txt"].iter().any(|e| has_extension(path, e)))?
+        {
             for (line, text) in texts(&file)? {
-                let named = ids.iter().find(|id| names(&text, id, table.names.plain_words.contains(&id.as_str())));
+                let named =
+                    ids.iter().find(|id| names(&text, id, table.names.plain_words.contains(&id.as_str())));
                 if let Some(id) = named {
                     broken.push(Broken {
                         file: from_root(root, &file),
                         line,
                         found: format!("`{text}`, which names the technique {id}"),
-                        expected: format!("no technique's name in {folder}: what is below the techniques knows none"),
+                        expected: format!(
+                            "no technique's name in {folder}: what is below the techniques knows none"
+                        ),
                     });
                 }
             }
@@ -39,7 +44,9 @@ fn texts(file: &Path) -> Result<Vec<(usize, String)>, Error> {
         Some("glsl") => words(&code),
         _ => {
             let lines = code.lines().enumerate().filter(|(_, line)| !line.starts_with('#'));
-            lines.flat_map(|(i, line)| line.split_whitespace().map(move |word| (i + 1, word.into()))).collect()
+            lines
+                .flat_map(|(i, line)| line.split_whitespace().map(move |word| (i + 1, word.into())))
+                .collect()
         }
     })
 }

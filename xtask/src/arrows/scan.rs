@@ -200,7 +200,8 @@ fn use_group(tokens: &[Token], at: &mut usize, prefix: &[String], leaves: &mut V
 fn read_path(tokens: &[Token], at: usize, inside: &[String], found: &mut Scan) -> usize {
     let Some(first) = tokens[at].word() else { return at + 1 };
     let goes_on = |i: usize| {
-        tokens.get(i).is_some_and(|t| t.kind == Kind::PathSeparator) && tokens.get(i + 1).is_some_and(|t| t.word().is_some())
+        tokens.get(i).is_some_and(|t| t.kind == Kind::PathSeparator)
+            && tokens.get(i + 1).is_some_and(|t| t.word().is_some())
     };
     let preceded = at > 0 && tokens[at - 1].kind == Kind::PathSeparator;
     let is_visibility = at >= 3
@@ -217,13 +218,19 @@ fn read_path(tokens: &[Token], at: usize, inside: &[String], found: &mut Scan) -
         end += 2;
     }
     if is_local(&path, &found.modules) {
-        found.references.push(Reference { line: tokens[at].line, path, inside: inside.to_vec(), exported_as: None });
+        found.references.push(Reference {
+            line: tokens[at].line,
+            path,
+            inside: inside.to_vec(),
+            exported_as: None,
+        });
     }
     end
 }
 
 fn is_local(path: &[String], modules: &[String]) -> bool {
-    path.first().is_some_and(|first| matches!(first.as_str(), "crate" | "super" | "self") || modules.contains(first))
+    path.first()
+        .is_some_and(|first| matches!(first.as_str(), "crate" | "super" | "self") || modules.contains(first))
 }
 
 /// Leaves out every item that `#[cfg(test)]` stands before.
@@ -422,7 +429,10 @@ mod tests {
     #[test]
     fn groups_within_groups_are_read() {
         let code = "use crate::{\n    a,\n    b::{self, c::{D, E as F}},\n    g::*,\n};\nuse std::fmt;\n";
-        assert_eq!(paths(code), ["2:crate::a", "3:crate::b", "3:crate::b::c::D", "3:crate::b::c::E", "4:crate::g"]);
+        assert_eq!(
+            paths(code),
+            ["2:crate::a", "3:crate::b", "3:crate::b::c::D", "3:crate::b::c::E", "4:crate::g"]
+        );
     }
 
     #[test]

@@ -29,7 +29,9 @@ pub fn check(root: &Path, table: &Table) -> Result<Vec<Broken>, Error> {
     };
     let mut broken = Vec::new();
     for include in includes(&all, &all)? {
-        let (Some((from, rule)), Some((to, _))) = (crate_of(&include.file), crate_of(&include.target)) else { continue };
+        let (Some((from, rule)), Some((to, _))) = (crate_of(&include.file), crate_of(&include.target)) else {
+            continue;
+        };
         if from != to && !table.allows(rule, &to) {
             broken.push(Broken {
                 file: from_root(root, &include.file),
@@ -56,7 +58,12 @@ fn includes(from: &[PathBuf], all: &[PathBuf]) -> Result<Vec<Include>, Error> {
         for (index, line) in read(file)?.lines().enumerate() {
             let Some(name) = included(line) else { continue };
             if let Some(target) = target(file, name, all) {
-                found.push(Include { file: file.clone(), line: index + 1, name: name.into(), target: target.clone() });
+                found.push(Include {
+                    file: file.clone(),
+                    line: index + 1,
+                    name: name.into(),
+                    target: target.clone(),
+                });
             }
         }
     }
@@ -73,7 +80,9 @@ fn included(line: &str) -> Option<&str> {
 /// several files the nearest is what the author meant.
 fn target<'a>(file: &Path, name: &str, all: &'a [PathBuf]) -> Option<&'a PathBuf> {
     let shared = |path: &Path| path.components().zip(file.components()).take_while(|(a, b)| a == b).count();
-    all.iter().filter(|path| path.ends_with(name)).max_by_key(|path| (shared(path), std::cmp::Reverse(path.components().count())))
+    all.iter()
+        .filter(|path| path.ends_with(name))
+        .max_by_key(|path| (shared(path), std::cmp::Reverse(path.components().count())))
 }
 
 #[cfg(test)]
@@ -90,7 +99,8 @@ mod tests {
 
     #[test]
     fn the_nearest_file_is_meant() {
-        let all: Vec<PathBuf> = ["/t/a/src/x/list.glsl", "/t/b/src/x/list.glsl"].iter().map(PathBuf::from).collect();
+        let all: Vec<PathBuf> =
+            ["/t/a/src/x/list.glsl", "/t/b/src/x/list.glsl"].iter().map(PathBuf::from).collect();
         assert_eq!(target(Path::new("/t/b/src/y/s.glsl"), "x/list.glsl", &all), Some(&all[1]));
         assert_eq!(target(Path::new("/t/b/src/y/s.glsl"), "st.glsl", &all), None);
     }

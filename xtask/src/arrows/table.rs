@@ -56,15 +56,31 @@ pub struct Names {
 /// The tree's own rules.
 pub static TABLE: Table = Table {
     crates: &[
-        Crate { folder: "crates/gpu", may_use: &[], reason: "Vulkan alone: the only unsafe code knows nothing above it" },
-        Crate { folder: "crates/shader", may_use: &[], reason: "build scripts use it before anything else is built" },
+        Crate {
+            folder: "crates/gpu",
+            may_use: &[],
+            reason: "Vulkan alone: the only unsafe code knows nothing above it",
+        },
+        Crate {
+            folder: "crates/shader",
+            may_use: &[],
+            reason: "build scripts use it before anything else is built",
+        },
         Crate {
             folder: "crates/graph",
             may_use: &["crates/gpu", "crates/shader"],
             reason: "a plan knows passes and resources, not what they are for",
         },
-        Crate { folder: "crates/scene", may_use: &[], reason: "a scene is data; it is loaded without a device" },
-        Crate { folder: "crates/oracle", may_use: &["crates/scene"], reason: "a twin on the CPU sees nothing that it checks" },
+        Crate {
+            folder: "crates/scene",
+            may_use: &[],
+            reason: "a scene is data; it is loaded without a device",
+        },
+        Crate {
+            folder: "crates/oracle",
+            may_use: &["crates/scene"],
+            reason: "a twin on the CPU sees nothing that it checks",
+        },
         Crate { folder: "crates/image", may_use: &[], reason: "files and comparisons of pixels" },
         Crate { folder: "crates/measure", may_use: &[], reason: "a record is data that other programs read" },
         Crate {
@@ -83,13 +99,21 @@ pub static TABLE: Table = Table {
             may_use: &["crates/graph", "crates/scene", "crates/cost"],
             reason: "what a technique is given; it knows no stage and no technique",
         },
-        Crate { folder: "crates/stages", may_use: &["crates/frame"], reason: "a stage never knows who uses it" },
+        Crate {
+            folder: "crates/stages",
+            may_use: &["crates/frame"],
+            reason: "a stage never knows who uses it",
+        },
         Crate {
             folder: "crates/renderer",
             may_use: &["crates/stages"],
             reason: "it is handed a technique and a set of shaders, and never names one",
         },
-        Crate { folder: "crates/techniques", may_use: &["crates/stages"], reason: "a technique is made of stages; it does not run itself" },
+        Crate {
+            folder: "crates/techniques",
+            may_use: &["crates/stages"],
+            reason: "a technique is made of stages; it does not run itself",
+        },
         Crate {
             folder: "crates/predict",
             may_use: &["crates/techniques", "crates/frame", "crates/cost", "crates/measure"],
@@ -97,7 +121,13 @@ pub static TABLE: Table = Table {
         },
         Crate {
             folder: "crates/lab",
-            may_use: &["crates/predict", "crates/renderer", "crates/techniques", "crates/measure", "crates/image"],
+            may_use: &[
+                "crates/predict",
+                "crates/renderer",
+                "crates/techniques",
+                "crates/measure",
+                "crates/image",
+            ],
             reason: "trials and comparisons, for a command line, a viewer or another language",
         },
         Crate {
@@ -106,7 +136,11 @@ pub static TABLE: Table = Table {
             reason: "an experiment is a library that any program can fill and run",
         },
         Crate { folder: "apps/*", may_use: &["crates/experiments"], reason: "a program parses and prints" },
-        Crate { folder: "bindings/*", may_use: &["crates/experiments"], reason: "a program in another language" },
+        Crate {
+            folder: "bindings/*",
+            may_use: &["crates/experiments"],
+            reason: "a program in another language",
+        },
         Crate {
             folder: "examples/*",
             may_use: &["crates/renderer", "crates/techniques", "crates/image"],
@@ -161,13 +195,17 @@ impl Table {
 
     /// Whether the crate in `from` may use the one in `to`, at once or through others.
     pub fn allows(&self, from: &Crate, to: &str) -> bool {
-        from.may_use.iter().any(|next| matches(next, to) || self.of(next).is_some_and(|next| self.allows(next, to)))
+        from.may_use
+            .iter()
+            .any(|next| matches(next, to) || self.of(next).is_some_and(|next| self.allows(next, to)))
     }
 }
 
 fn matches(pattern: &str, folder: &str) -> bool {
     match pattern.strip_suffix("/*") {
         None => pattern == folder,
-        Some(parent) => folder.strip_prefix(parent).is_some_and(|rest| rest.starts_with('/') && !rest[1..].contains('/')),
+        Some(parent) => {
+            folder.strip_prefix(parent).is_some_and(|rest| rest.starts_with('/') && !rest[1..].contains('/'))
+        }
     }
 }

@@ -4,7 +4,10 @@ use std::path::{Path, PathBuf};
 
 use crate::{Error, at};
 
-/// Every file below `folder` that `wanted` takes, sorted; none where there is no such folder. Build outputs and hidden folders are left out.
+/// Folders that hold nothing which the rules are about: build outputs, the template of a technique, and tests, which may use anything.
+const LEFT_OUT: &[&str] = &["target", "template", "tests", "benches", "fuzz"];
+
+/// Every file below `folder` that `wanted` takes, sorted; none where there is no such folder.
 pub fn files(folder: &Path, wanted: &dyn Fn(&Path) -> bool) -> Result<Vec<PathBuf>, Error> {
     let mut found = Vec::new();
     collect(folder, wanted, &mut found)?;
@@ -19,10 +22,10 @@ fn collect(folder: &Path, wanted: &dyn Fn(&Path) -> bool, found: &mut Vec<PathBu
     for entry in std::fs::read_dir(folder).map_err(|error| at(folder, error))? {
         let path = entry.map_err(|error| at(folder, error))?.path();
         let name = path.file_name().unwrap_or_default().to_string_lossy();
-        let skipped = name == "target" || name == "template" || name.starts_with('.');
-        if path.is_dir() && !skipped {
+        let left_out = LEFT_OUT.contains(&name.as_ref()) || name.starts_with('.');
+        if path.is_dir() && !left_out {
             collect(&path, wanted, found)?;
-        } else if path.is_file() && wanted(&path) {
+        } else if path.is_file() && name != "tests.rs" && wanted(&path) {
             found.push(path);
         }
     }
