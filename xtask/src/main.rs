@@ -1,6 +1,9 @@
 //! `cargo xtask NAME`: the project's chores.
 
-use std::process::{Command, ExitCode};
+use std::{
+    path::Path,
+    process::{Command, ExitCode},
+};
 
 use xtask::{Error, arrows, new_technique, workspace};
 
@@ -46,7 +49,21 @@ fn check_arrows() -> Result<ExitCode, Error> {
 fn make_technique(id: &str, title: Option<&str>) -> Result<ExitCode, Error> {
     let folder = new_technique::make(&workspace(), id, title)?;
     println!("{}", folder.display());
+    format_code(&folder)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Formats the Rust files of a folder: where lines break depends on the length of the id.
+fn format_code(folder: &Path) -> Result<(), Error> {
+    let files = std::fs::read_dir(folder).map_err(|error| Error(format!("{}: {error}", folder.display())))?;
+    let files = files.filter_map(Result::ok).map(|entry| entry.path());
+    let files = files.filter(|path| path.extension().is_some_and(|extension| extension == "rs"));
+    let status = Command::new("rustfmt").args(["--edition", "2024"]).args(files).status();
+    match status {
+        Ok(status) if status.success() => Ok(()),
+        Ok(status) => Err(Error(format!("rustfmt: found {status}, expected success"))),
+        Err(error) => Err(Error(format!("cannot run rustfmt: {error}"))),
+    }
 }
 
 /// Runs the test that compares the generated tables with the registry; with `write` it rewrites them instead. The registry is read by a test of

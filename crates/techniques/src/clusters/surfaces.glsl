@@ -1,5 +1,5 @@
 // View distances of the surfaces of a pixel, whatever holds them: depth at the samples (multisample/sample_depth.glsl) or, with
-// SURFACES_DAIS_LIST, lists of triangles. Who includes it has visit_distance(distance_m).
+// SURFACES_DAIS_LIST, lists of triangles. The including shader defines visit_distance(distance_m).
 #ifndef AFTERLIGHT_SURFACES
 #define AFTERLIGHT_SURFACES
 #ifdef SURFACES_DAIS_LIST
@@ -17,7 +17,7 @@ void visit_pixel(ivec2 pixel) {
     source_begin(pixel);
     while (source_next_triangle(name, weight)) {
         float distance_m = record_distance(source_place(name), vec2(pixel));
-        // Beside a triangle that is seen edge-on its plane may lie behind the eye.
+        // Next to a triangle that is seen edge-on, its plane may lie behind the eye.
         if (distance_m > 0.0) {
             visit_distance(distance_m);
         }
