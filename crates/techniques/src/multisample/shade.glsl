@@ -1,7 +1,8 @@
-// Shades the surfaces of a pixel and averages them by their weights, whatever holds them: a SOURCE_* macro names it.
+// Shades the surfaces of a pixel and averages them by their weights. Where the surfaces come from is up to the source, which a SOURCE_*
+// macro names.
 //
-// A source has three parts: source_begin(pixel), source_next(surface, weight) until it is false, and source_background, the
-// samples without a surface. Weights are samples; they and the background sum to SAMPLES.
+// A source defines source_begin(pixel), source_next(surface, weight), which is called until it returns false, and source_background, the
+// number of samples without a surface. A weight is a number of samples; the weights and the background sum to SAMPLES.
 #include "shading.glsl"
 #include "heat.glsl"
 #include "multisample/sample_depth.glsl"
@@ -24,14 +25,14 @@ layout(constant_id = 9) const uint VIEW = 0u;
 uint shaded_count;  // surfaces shaded
 uint weight_sum;
 
-// What the surfaces of a pixel give it, from the sum over them; there must be one.
+// The radiance that a pixel gets from its surfaces, given their weighted sum. The pixel must show at least one.
 vec3 of_surfaces(vec3 weighted_radiance) {
-    // Samples that a list dropped take the colour of the others; else the factor is exactly 1.
+    // Samples that a list has dropped take the mean colour of the others. Without dropped samples the factor is exactly 1.
     float share = float(SAMPLES - source_background) / float(weight_sum);
     return weighted_radiance * share / float(SAMPLES);
 }
 
-// Radiance of a pixel from the sum over its surfaces, or what a view shows of it.
+// Radiance of a pixel from the weighted sum over its surfaces; or, in a debug view, the colour that the view shows.
 vec3 resolved(vec3 weighted_radiance) {
     if (VIEW == 1u) {
         return sample_usage_color(shaded_count, SAMPLES);

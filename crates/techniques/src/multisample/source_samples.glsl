@@ -1,7 +1,7 @@
 // Surfaces of a pixel from the multisampled G-buffer that samples.frag.glsl fills.
 //
-// SOURCE_SSAA: every sample. SOURCE_MSAA: every sample where a triangle's edge crosses the pixel, else the first alone;
-// PIXEL_RATE and SAMPLE_RATE say which before.
+// SOURCE_SSAA: every sample. SOURCE_MSAA: every sample where a triangle's edge crosses the pixel, else the first sample
+// only. PIXEL_RATE and SAMPLE_RATE fix the choice at compile time.
 #include "multisample/edge_mark.glsl"
 
 layout(set = 0, binding = 9) uniform texture2DMS gbuffer_base_color;
