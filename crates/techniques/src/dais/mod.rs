@@ -2,6 +2,7 @@
 
 // ORDER: 140
 
+pub(crate) mod low_rate;
 mod passes;
 
 pub(crate) use passes::{FillPass, depth_surfaces};
@@ -10,7 +11,7 @@ pub mod cost;
 
 use afterlight_graph::{BufferHandle, BufferRole, Graph, ImageHandle, Load, PassRole, RasterPass, gpu::vk};
 
-use crate::dais_multirate::LowRate;
+use crate::dais::low_rate::LowRate;
 use afterlight_cost::{Cost, Workload};
 use afterlight_frame::{
     ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, OpaqueDepth, ParamInfo, ParamKind, Params,

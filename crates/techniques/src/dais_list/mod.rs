@@ -7,8 +7,10 @@ pub mod cost;
 use afterlight_graph::{BufferHandle, BufferRole, Graph, ImageHandle, ImageInfo, Load, PassRole, RasterPass};
 
 use crate::{
-    dais::{self, Cache, FillPass},
-    dais_multirate::{FULL_RATE, LowRate, SHARE},
+    dais::{
+        self, Cache, FillPass,
+        low_rate::{FULL_RATE, LowRate, SHARE},
+    },
     gbuffer_list,
 };
 use afterlight_cost::{Cost, Workload};
