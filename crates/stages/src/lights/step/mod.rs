@@ -3,13 +3,10 @@
 
 use afterlight_graph::{BufferRole, Graph, ImageHandle, PassRole};
 
-use crate::{
-    lights::{
-        bvh::{self, LightBvh},
-        cells::{self, CellLists, Division, Grid, VisibleDepths},
-        pixel_lists::{self, LightLists},
-    },
-    surfaces::depth_first::{draw_depth, shade_visible},
+use crate::lights::{
+    bvh::{self, LightBvh},
+    cells::{self, CellLists, Division, Grid, VisibleDepths},
+    pixel_lists::{self, LightLists},
 };
 use afterlight_frame::{Frame, Info, ParamInfo, ParamKind, Params, Slots, TechniqueError, views};
 
