@@ -280,10 +280,10 @@ fn triangles_are_sorted_where_draws_cannot_be() {
     }
 }
 
-/// What `transparent/blend.frag` shades by.
+/// What `compose/transparent/blend.frag` shades by.
 const CALL: &str = "stepped_radiance(s, uvec2(gl_FragCoord.xy))";
 
-/// `transparent/blend.frag` with a part of its text replaced.
+/// `compose/transparent/blend.frag` with a part of its text replaced.
 fn mutant(from: &str, to: &str) -> Shader {
     let path = sources().join("compose/transparent/blend.frag.glsl");
     compiled("compose/transparent/blend.frag", &path, &[], &[(from, to)])
