@@ -13,7 +13,7 @@ use std::{
 /// The document, from the root of the tree.
 const DOCUMENT: &str = "docs/first-technique.md";
 /// Where the document makes its technique, from the root of the tree.
-const FOLDER: &str = "crates/techniques/src/packed_surface/";
+const FOLDER: &str = "crates/techniques/src/four_words/";
 /// Documents with generated regions.
 const GENERATED: &[&str] = &["README.md"];
 
@@ -45,6 +45,8 @@ fn copy_tree(root: &Path, copy: &Path) {
     for file in files.split('\0').filter(|file| !file.is_empty() && root.join(file).is_file()) {
         copy_file(&root.join(file), &copy.join(file));
     }
+    // Where a tree has been built there is one; the document's commands write into it.
+    fs::create_dir(copy.join("target")).unwrap();
     output("git", &["init", "--quiet"], copy);
     output("git", &["add", "--all"], copy);
     let author = ["-c", "user.name=test", "-c", "user.email=test@localhost"];
@@ -119,7 +121,7 @@ fn a_new_technique_is_one_folder_and_agrees_with_forward() {
         seed(built, &profile);
     }
     let blocks = blocks(&fs::read_to_string(copy.join(DOCUMENT)).unwrap());
-    assert!(blocks.iter().any(|block| block.contains("cargo xtask new-technique packed-surface")));
+    assert!(blocks.iter().any(|block| block.contains("cargo xtask new-technique four-words")));
     assert!(blocks.iter().any(|block| block.contains("--test agreement")));
     for block in &blocks {
         run(block, &copy, &target);
@@ -141,7 +143,7 @@ fn a_new_technique_is_one_folder_and_agrees_with_forward() {
                 && !line.starts_with("---")
         })
         .collect();
-    assert!(matches!(lines[..], [row] if row.starts_with("+| [`packed-surface`]")), "found {lines:#?}");
+    assert!(matches!(lines[..], [row] if row.starts_with("+| [`four-words`]")), "found {lines:#?}");
     fs::remove_dir_all(&copy).unwrap();
 }
 
