@@ -7,9 +7,8 @@ use afterlight_graph::{
 use afterlight_shader::Shader;
 
 use crate::{
-    Board, Slots, TechniqueError,
+    Board, Params, Slots, TechniqueError,
     capacity::Capacities,
-    params::Params,
     scene::{BUCKETS, SceneGpu, lights::SceneLights},
     views,
 };
@@ -22,7 +21,7 @@ pub struct Frame<'a> {
     pub height_px: u32,
     /// Visibility samples a pixel.
     pub samples: u32,
-    /// Parameters of the technique.
+    /// Parameters, all of [`crate::params_of`] the technique.
     pub params: &'a Params,
     /// The scene.
     pub scene: &'a SceneGpu,

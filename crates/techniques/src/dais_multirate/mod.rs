@@ -2,44 +2,27 @@
 
 // ORDER: 160
 
+mod params;
+
+pub use params::{DaisMultirateParams, Rate, RateParams, Share};
+
 use afterlight_graph::{Graph, ImageHandle};
 
-use crate::dais;
+use crate::dais::{self, Asked};
 use afterlight_cost::{Cost, Workload};
 use afterlight_frame::{
-    Answers, Exactness, Frame, Info, ParamInfo, ParamKind, Params, Source, SourceSlots, Technique,
+    Answers, Exactness, Frame, Info, Params, Source, SourceSlots, Technique,
     TechniqueError, views,
 };
 use afterlight_graph::gpu;
 use afterlight_shader::Shader;
-use afterlight_stages::{lights::step, shared::indirect::IndirectLight, surfaces::compute_raster};
+use afterlight_stages::shared::indirect::IndirectLight;
 
 /// The technique.
 pub static TECHNIQUE: DaisMultirate = DaisMultirate;
 
 /// See the module.
 pub struct DaisMultirate;
-
-const RATE_VALUES: &[&str] = &["1", "1/2", "1/4", "1/8"];
-const RATE_SUMMARY: &str =
-    "shading samples of indirect light a pixel along each axis; a triangle's neighbouring pixels share one";
-
-/// Rate of indirect light, where the technique is made for low ones.
-const RATE: ParamInfo = ParamInfo {
-    key: "rate",
-    summary: RATE_SUMMARY,
-    kind: ParamKind::Choice { values: RATE_VALUES },
-    default: "1/2",
-};
-/// Rate of indirect light, where full rate is what is expected.
-pub(crate) const FULL_RATE: ParamInfo = ParamInfo { default: "1", ..RATE };
-/// How pixels find whom they share a sample with.
-pub(crate) const SHARE: ParamInfo = ParamInfo {
-    key: "share",
-    summary: "who shares a shading sample: pixels of a cell of the shading grid, by a memoization table, or quads that one triangle fills, by subgroup quad operations (rate 1/2 alone); auto: quads where there can be",
-    kind: ParamKind::Choice { values: &["auto", "grid", "quads"] },
-    default: "auto",
-};
 
 /// Subgroup quad operations in compute shaders.
 fn has_quads(features: &gpu::Features) -> bool {
@@ -64,29 +47,31 @@ pub(crate) struct LowRate {
 }
 
 impl LowRate {
-    /// What a frame of the technique asks for by its parameters [`RATE`] and [`SHARE`]; `None` at full rate or without indirect
-    /// light.
+    /// What parameters ask for; `None` at full rate or without indirect light.
     ///
     /// # Errors
     /// Quads at another rate than 1/2; what the device lacks.
-    pub fn chosen(frame: &Frame<'_>, info: &'static Info) -> Result<Option<Self>, TechniqueError> {
-        let rate = frame.params.text(info, RATE.key);
-        let cell_px: u32 = rate.rsplit('/').next().and_then(|n| n.parse().ok()).unwrap_or(1);
-        let quads = match frame.params.text(info, SHARE.key) {
-            "auto" => cell_px == 2 && has_quads(frame.features()),
-            share => share == "quads",
+    pub fn chosen(
+        frame: &Frame<'_>,
+        technique: &'static str,
+        RateParams { rate, share }: RateParams,
+    ) -> Result<Option<Self>, TechniqueError> {
+        let quads = match share {
+            Share::Auto => rate == Rate::Half && has_quads(frame.features()),
+            Share::Grid => false,
+            Share::Quads => true,
         };
-        if quads && cell_px != 2 {
+        if quads && rate != Rate::Half {
             return Err(TechniqueError::Conflict {
-                technique: info.id,
+                technique,
                 found: format!("share=quads with rate={rate}"),
                 expected: "rate=1/2, or share=grid".to_owned(),
             });
         }
-        if cell_px == 1 || !frame.board.has::<IndirectLight>() {
+        if rate == Rate::Full || !frame.board.has::<IndirectLight>() {
             return Ok(None);
         }
-        let unavailable = |missing: String| Err(TechniqueError::Unavailable { technique: info.id, missing });
+        let unavailable = |missing: String| Err(TechniqueError::Unavailable { technique, missing });
         if quads && !has_quads(frame.features()) {
             return unavailable(
                 "subgroup quad operations for share=quads (share=grid does without)".to_owned(),
@@ -100,7 +85,7 @@ impl LowRate {
                 frame.samples
             ));
         }
-        Ok(Some(Self { cell_px, quads }))
+        Ok(Some(Self { cell_px: rate.cell_px(), quads }))
     }
 
     /// Tag of the shading shader's variants.
@@ -136,16 +121,6 @@ static INFO: Info = Info {
         bound: "indirect light of a cell's pixels is that of their mean place; without --indirect as dais",
         min_psnr_db: 40.0,
     },
-    params: &[
-        step::LIGHTS,
-        RATE,
-        SHARE,
-        dais::FILL,
-        dais::CACHE_BUCKETS,
-        dais::REFERENCE_BITS,
-        compute_raster::VISIBILITY,
-        compute_raster::SMALL,
-    ],
     needs: &[],
     samples: &[1, 2, 4, 8],
     tessellation: true,
@@ -161,12 +136,18 @@ impl Technique for DaisMultirate {
         &crate::SHADERS
     }
 
+    fn params(&self) -> Params {
+        Params::of(DaisMultirateParams::default())
+    }
+
     fn predict(&self, workload: &Workload, _: &Params) -> Cost {
         crate::dais::cost::dais(workload)
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
-        let rate = LowRate::chosen(frame, &INFO)?;
-        dais::record(graph, frame, &INFO, rate.as_ref())
+        let params = frame.params.typed::<DaisMultirateParams>();
+        let rate = LowRate::chosen(frame, INFO.id, params.rate)?;
+        let asked = Asked { technique: INFO.id, lights: params.light_step().method(frame), rate };
+        dais::record(graph, frame, &asked, (params.fill, params.raster))
     }
 }

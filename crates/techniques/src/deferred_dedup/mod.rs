@@ -13,7 +13,7 @@ use afterlight_frame::{
 };
 use afterlight_shader::Shader;
 use afterlight_stages::{
-    lights::step,
+    lights::step::StepParams,
     surfaces::shade,
     surfaces::{
         geometry::SceneDraws,
@@ -50,7 +50,6 @@ static INFO: Info = Info {
         rates_decoupled: "n, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
-    params: &[step::LIGHTS],
     needs: &[samples::STANDARD_LOCATIONS],
     samples: MULTIPLE_SAMPLES,
     tessellation: true,
@@ -66,21 +65,31 @@ impl Technique for DeferredDedup {
         &crate::SHADERS
     }
 
+    fn params(&self) -> Params {
+        Params::of(StepParams::default())
+    }
+
     fn predict(&self, workload: &Workload, _: &Params) -> Cost {
         cost::deferred_dedup(workload)
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let filled = fill(graph, frame)?;
-        let surfaces = filled.surfaces(frame);
+        let lights = frame.params.typed::<StepParams>().light_step().method(frame);
         let source = SurfaceSource {
             folder: "deferred_dedup",
             tag: "",
             shading_tag: emission_tag(frame),
             samples: frame.samples,
         };
-        let radiance = shade::shade(graph, frame, &INFO, source, &surfaces, &|pass| filled.bind(pass))?;
-        drop(surfaces);
+        let radiance = shade::shade(
+            graph,
+            frame,
+            (INFO.id, lights),
+            source,
+            &filled.surfaces(frame),
+            &|pass| filled.bind(pass),
+        )?;
         frame.board.put(OpaqueDepth(filled.depth));
         Ok(radiance)
     }

@@ -43,7 +43,6 @@ static INFO: Info = Info {
         rates_decoupled: "n, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
-    params: &[],
     needs: &[],
     samples: &[1],
     tessellation: true,
@@ -78,11 +77,11 @@ impl Technique for DeferredStencil {
         &INFO
     }
 
-    /// As deferred, with two draws a light, the volumes' vertices processed twice.
     fn shaders(&self) -> &[Shader] {
         &crate::SHADERS
     }
 
+    /// As deferred, with two draws a light, the volumes' vertices processed twice.
     fn predict(&self, workload: &Workload, _: &Params) -> Cost {
         let twice = Workload {
             light_command: 2.0 * workload.light_command,

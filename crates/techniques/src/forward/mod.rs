@@ -14,7 +14,7 @@ use afterlight_frame::{
 use afterlight_shader::Shader;
 use afterlight_stages::{
     surfaces::depth_first::shaded_surfaces,
-    surfaces::{RadianceTarget, geometry::SceneDraws},
+    surfaces::RadianceTarget,
     views::InvocationCount,
 };
 
@@ -45,7 +45,6 @@ static INFO: Info = Info {
         rates_decoupled: "n, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
-    params: &[],
     needs: &[],
     samples: ANY_SAMPLES,
     tessellation: true,

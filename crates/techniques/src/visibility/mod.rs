@@ -3,6 +3,9 @@
 // ORDER: 70
 
 pub mod cost;
+mod params;
+
+pub use params::VisibilityParams;
 
 use afterlight_graph::{BufferRole, Graph, ImageHandle, Load, PassRole, gpu::vk};
 
@@ -15,7 +18,7 @@ use afterlight_shader::Shader;
 use afterlight_stages::{
     lights::{
         cells::VisibleDepths,
-        step::{self, LightStep},
+        step::LightStep,
     },
     surfaces::{compute_raster, geometry, shade::add_volumes},
 };
@@ -47,7 +50,6 @@ static INFO: Info = Info {
         rates_decoupled: "y, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 45.0 },
-    params: &[step::LIGHTS, compute_raster::VISIBILITY, compute_raster::SMALL],
     needs: &[],
     samples: &[1],
     tessellation: false,
@@ -66,13 +68,18 @@ impl Technique for Visibility {
         &crate::SHADERS
     }
 
+    fn params(&self) -> Params {
+        Params::of(VisibilityParams::default())
+    }
+
     fn predict(&self, workload: &Workload, _: &Params) -> Cost {
         cost::visibility_buffer(workload)
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
-        if compute_raster::is_chosen(frame, &INFO)? {
-            return shade_keys(graph, frame);
+        let raster = frame.params.typed::<VisibilityParams>().raster;
+        if compute_raster::is_chosen(frame, INFO.id, raster.visibility)? {
+            return shade_keys(graph, frame, raster.small_px);
         }
         let ids =
             graph.image("visibility/ids", BufferRole::Visibility, frame.image_info(vk::Format::R32_UINT));
@@ -99,8 +106,12 @@ impl Technique for Visibility {
 }
 
 /// The same from triangles that compute has found.
-fn shade_keys(graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
-    let keys = compute_raster::rasterize(graph, frame, &INFO, 1)?;
+fn shade_keys(
+    graph: &mut Graph,
+    frame: &Frame<'_>,
+    small_px: u32,
+) -> Result<ImageHandle, TechniqueError> {
+    let keys = compute_raster::rasterize(graph, frame, INFO.id, small_px, 1)?;
     shade(graph, frame, "#keys", &VisibleDepths::of_keys(&keys, 1), &|pass| {
         pass.constant("SAMPLES", 1);
         pass.read_buffer("SampleKeys", &keys);
@@ -116,7 +127,8 @@ fn shade(
     surfaces: &VisibleDepths<'_>,
     bind: &dyn Fn(&mut dyn SourceSlots),
 ) -> Result<ImageHandle, TechniqueError> {
-    let step = LightStep::build(graph, frame, &INFO, surfaces)?;
+    let lights = frame.params.typed::<VisibilityParams>().light_step().method(frame);
+    let step = LightStep::build(graph, frame, INFO.id, lights, surfaces)?;
     let radiance = graph.image(
         "visibility/radiance",
         BufferRole::Targets,

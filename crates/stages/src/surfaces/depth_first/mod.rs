@@ -1,6 +1,6 @@
 //! Depth alone first, then forward shading of what is visible: by a loop over all lights, or by the lists of lights of a light step.
 
-use afterlight_frame::{Frame, Info, OpaqueDepth, TechniqueError, views::INVOCATIONS};
+use afterlight_frame::{Frame, OpaqueDepth, TechniqueError, views::INVOCATIONS};
 use afterlight_graph::{
     BufferRole, DepthTest, Graph, ImageHandle, Load, PassRole, RasterPass, StencilFace, StencilTest, gpu::vk,
 };
@@ -109,12 +109,11 @@ pub fn shade_forward(
 pub fn record_forward(
     graph: &mut Graph,
     frame: &Frame<'_>,
-    info: &Info,
+    technique: &str,
     division: Division,
 ) -> Result<ImageHandle, TechniqueError> {
-    let depth = draw_depth(graph, frame, info.id)?;
-    let surfaces = VisibleDepths::of_depth(&depth, frame.samples);
-    let lists = cells::build(graph, frame, info.id, division, &surfaces)?;
-    drop(surfaces);
-    shade_forward(graph, frame, info.id, depth, &LightStep::Cells(lists))
+    let depth = draw_depth(graph, frame, technique)?;
+    let lists =
+        cells::build(graph, frame, technique, division, &VisibleDepths::of_depth(&depth, frame.samples))?;
+    shade_forward(graph, frame, technique, depth, &LightStep::Cells(lists))
 }

@@ -1,9 +1,8 @@
 //! Parameters of `deferred`.
 
-use afterlight_params::parameters;
+use afterlight_frame::params::parameters;
+use afterlight_stages::lights::{cells::CellParams, step::{GbufferLightParams, LightStepParams}};
 
-use super::clusters::CellParams;
-use super::light_step::{GbufferLightParams, LightStepParams};
 
 parameters! {
     /// Parameters of `deferred`.

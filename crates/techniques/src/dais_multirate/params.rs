@@ -1,11 +1,12 @@
 //! Parameters of `dais-multirate`.
 
-use afterlight_params::{choices, parameters};
+use afterlight_frame::params::{choices, parameters};
+use afterlight_stages::{
+    lights::{cells::CellParams, step::{LightParams, LightStepParams}},
+    surfaces::compute_raster::ComputeRasterParams,
+};
 
-use super::clusters::CellParams;
-use super::compute_raster::ComputeRasterParams;
-use super::dais::FillParams;
-use super::light_step::{LightParams, LightStepParams};
+use crate::dais::FillParams;
 
 choices! {
     /// Shading samples of indirect light a pixel along each axis.
