@@ -184,6 +184,30 @@ fn lists_are_text_and_json() {
 }
 
 #[test]
+fn specifications_are_shown_and_read() {
+    let shown =
+        run(&["bench", "dais-fig5", "--show-spec", "--scale", "0.5", "--views", "3", "--lights", "7"]);
+    let spec = json(&shown);
+    assert_eq!(
+        (&spec["scale"], &spec["views"], &spec["frame"]["lights"]),
+        (&0.5.into(), &3.into(), &7.into())
+    );
+    let folder = folder();
+    let show = |text: &str| {
+        fs::write(folder.path().join("a.json"), text).expect("written");
+        run_in(folder.path(), &["bench", "dais-fig5", "--spec", "a.json", "--show-spec"])
+    };
+    assert_eq!(json(&show(&text(&shown.stdout))), spec);
+    assert_eq!(json(&show(r#"{"views": 3}"#))["frame"]["width"], 1920);
+    let told = show(r#"{"veiws": 3}"#);
+    assert_eq!(told.status.code(), Some(2));
+    assert!(text(&told.stderr).contains("veiws") && text(&told.stderr).lines().count() == 1);
+    refused(&["bench", "speed", "--spec", "absent.json"], 2, &["absent.json"]);
+    refused(&["bench", "all", "--spec", "absent.json"], 2, &["--spec", "one experiment"]);
+    refused(&["bench", "speed", "--spec", "absent.json", "--width", "64"], 2, &["--spec", "--width"]);
+}
+
+#[test]
 fn completions_and_help_are_printed() {
     for shell in ["bash", "zsh", "fish"] {
         assert!(text(&run(&["completions", shell]).stdout).contains("afterlight"), "{shell}");

@@ -102,15 +102,19 @@ pub struct Cost {
 }
 
 impl Workload {
+    /// Processing of all object vertices: ov × ov_proc.
     pub fn vertices(&self) -> f64 {
         self.object_vertices * self.object_vertex_processing
     }
+    /// Processing of all vertices of light volumes: lv × lv_proc.
     pub fn light_volumes(&self) -> f64 {
         self.light_vertices * self.light_vertex_processing
     }
+    /// Floats of all object vertices: ov × ov_band.
     pub fn vertex_traffic(&self) -> f64 {
         self.object_vertices * self.object_vertex_traffic
     }
+    /// Floats of all vertices of light volumes: lv × lv_band.
     pub fn volume_traffic(&self) -> f64 {
         self.light_vertices * self.light_vertex_traffic
     }

@@ -9,12 +9,15 @@ use crate::{SceneGpu, SceneLights, Settings, views};
 
 /// A camera's matrices for an image size.
 pub struct CameraView {
+    /// World to clip space.
     pub clip_from_world: Mat4,
     view_from_world: Mat4,
+    /// The eye, world space, m.
     pub eye_ws: Vec3,
 }
 
 impl CameraView {
+    /// The view of the settings' camera at their width and height.
     pub fn new(settings: &Settings) -> Self {
         let aspect = settings.width_px as f32 / settings.height_px as f32;
         let view_from_world = settings.camera.view_from_world();
@@ -30,6 +33,7 @@ impl CameraView {
         -self.view_from_world.row(2)
     }
 
+    /// What `include/frame.glsl` declares, for this view.
     pub fn constants(&self, settings: &Settings, lights: &SceneLights, scene: &SceneGpu) -> FrameConstants {
         let distance_from_world = self.distance_from_world();
         let near_m = match settings.camera.projection {

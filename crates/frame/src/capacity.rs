@@ -84,6 +84,7 @@ pub struct Capacities {
 }
 
 impl Capacities {
+    /// Whether the frame has a list that can overflow.
     pub fn is_watched(&self) -> bool {
         !self.demands.borrow().is_empty()
     }
@@ -94,6 +95,7 @@ impl Capacities {
         if unsteady { UNSTEADY_FRAMES } else { 1 }
     }
 
+    /// The counters that the frame has.
     pub fn demands(&self) -> Vec<Demand> {
         self.demands.borrow().clone()
     }

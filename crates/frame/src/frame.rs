@@ -37,9 +37,13 @@ pub struct Frame<'a> {
     pub clip_from_world: glam::Mat4,
     /// Radiance of pixels without a surface.
     pub background_radiance: [f32; 3],
+    /// Buffers of the scene and the frame as the graph knows them.
     pub buffers: SceneBuffers,
+    /// Compiled shaders by which [`Self::shader`] finds names; of equal names the first counts.
     pub shaders: &'a [&'a [Shader]],
+    /// The device that the frame will run on.
     pub device: &'a gpu::Device,
+    /// Capacities that earlier frames of the same view asked for.
     pub capacities: &'a Capacities,
     /// Draws that the eye has in view, by bucket, in drawing order.
     pub visible: &'a [Vec<u32>; BUCKETS],
@@ -49,19 +53,33 @@ pub struct Frame<'a> {
 
 /// Buffers of the scene and the frame as the graph knows them.
 pub struct SceneBuffers {
+    /// `FrameBlock`: constants of the view.
     pub frame: BufferHandle,
+    /// A `DrawData` a draw, as a stream of instances.
     pub draws: BufferHandle,
+    /// The same, four texels a draw.
     pub draw_data: ImageHandle,
+    /// Materials, eight texels each.
     pub materials: ImageHandle,
+    /// Rows of texture transforms.
     pub uv_transforms: BufferHandle,
+    /// Lights, four texels each.
     pub lights: ImageHandle,
+    /// Spheres around what lights reach, a texel each.
     pub light_spheres: ImageHandle,
+    /// Positions of vertices, object space.
     pub positions: BufferHandle,
+    /// Other attributes of vertices.
     pub attributes: BufferHandle,
+    /// Indices of triangles.
     pub indices: BufferHandle,
+    /// Indirect commands of the draws in view, a range a bucket.
     pub commands: BufferHandle,
+    /// Number of commands of each bucket.
     pub command_counts: BufferHandle,
+    /// Vertices of the icosphere that light volumes are drawn by.
     pub volume: BufferHandle,
+    /// Its indices.
     pub volume_indices: BufferHandle,
 }
 

@@ -1,6 +1,6 @@
 //! The pipeline cache on disk.
 //!
-//! A driver may crash on a cache that is not its own or is damaged, so the file carries a checksum beside the header that
+//! A driver may crash on a damaged cache or on that of another driver, so the file carries a checksum beside the header that
 //! Vulkan prescribes (`VkPipelineCacheHeaderVersionOne`), and both are checked before the driver sees the data.
 
 use crate::DeviceInfo;
@@ -47,7 +47,7 @@ pub(crate) fn write(path: &Path, file: &[u8]) -> std::io::Result<()> {
     let written = std::fs::File::create(&beside).and_then(|mut f| f.write_all(file));
     let renamed = written.and_then(|()| std::fs::rename(&beside, path));
     if renamed.is_err() {
-        // What is left beside helps nobody; that it cannot be removed either is no second error.
+        // The temporary file is useless now. If it cannot be removed either, the first error is still the one to report.
         let _ = std::fs::remove_file(&beside);
     }
     renamed

@@ -1,4 +1,4 @@
-//! What shaders read and write: descriptors that are pushed with each pass (set 0) and long-lived sets (set 1).
+//! Descriptors, through which shaders read and write resources: those pushed with each pass (set 0) and long-lived sets (set 1).
 
 use crate::device::lock;
 use crate::memory::check_limit;

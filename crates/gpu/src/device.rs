@@ -53,7 +53,7 @@ pub(crate) struct DeviceInner {
     pub instance: Instance,
 }
 
-/// Locks `mutex`; a panic elsewhere leaves the guarded data of this crate whole, so poison is no reason to stop.
+/// Locks `mutex`; the data that this crate guards stays valid when a thread panics, so a poisoned lock is taken all the same.
 pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -274,7 +274,7 @@ impl Drop for DeviceInner {
             for recorder in lock(&self.recorders).drain(..) {
                 recorder.destroy(&self.raw, allocator.as_mut());
             }
-            // A cache that cannot be written costs time at the next start, no more; `save_pipeline_cache` reports.
+            // A cache that cannot be written only costs time at the next start. Who wants the error calls `save_pipeline_cache`.
             let _ = self.pipelines.save(&self.raw, &self.info);
             self.pipelines.destroy(&self.raw);
             self.set_layouts.destroy(&self.raw);

@@ -66,14 +66,14 @@ pub struct ImageBarrier<'a> {
     pub new_layout: vk::ImageLayout,
 }
 
-/// What becomes of an attachment's contents at the begin of a pass.
+/// What happens to an attachment's contents at the start of a pass.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Load<T> {
     /// Cleared to a value.
     Clear(T),
     /// Kept.
     Keep,
-    /// Undefined: all that is read will have been written.
+    /// The contents are undefined: the pass writes everything that is read later.
     DontCare,
 }
 
@@ -122,7 +122,7 @@ pub struct Resolve<'a> {
 pub struct ColorAttachment<'a> {
     /// The image: one level.
     pub view: &'a ImageView,
-    /// What becomes of its contents before.
+    /// What happens to its contents at the start of the pass.
     pub load: Load<ClearColor>,
     /// Whether what is drawn is kept.
     pub store: bool,
@@ -137,7 +137,7 @@ pub struct DepthAttachment<'a> {
     pub view: &'a ImageView,
     /// The layout that it is in.
     pub layout: vk::ImageLayout,
-    /// What becomes of its contents before.
+    /// What happens to its contents at the start of the pass.
     pub load: Load<f32>,
     /// Whether what is drawn is kept.
     pub store: bool,
@@ -150,7 +150,7 @@ pub struct StencilAttachment<'a> {
     pub view: &'a ImageView,
     /// The layout that it is in.
     pub layout: vk::ImageLayout,
-    /// What becomes of its contents before.
+    /// What happens to its contents at the start of the pass.
     pub load: Load<u32>,
     /// Whether what is drawn is kept.
     pub store: bool,
@@ -227,7 +227,7 @@ impl Completed {
     }
 }
 
-/// What the recorded commands use, held until they are done.
+/// The resources that recorded commands use, kept alive until the device is done with them.
 #[allow(dead_code)] // Held for its drop alone.
 enum Kept {
     Buffer(Buffer),
@@ -827,7 +827,7 @@ impl Encoder {
 
     fn run(&mut self) -> Result<Completed, GpuError> {
         assert!(!self.is_rendering, "submit within rendering");
-        // Waiting for a query that never ended would never end.
+        // A query without an end would be waited for without end.
         assert!(self.counting.is_none(), "submit while {:?} counts", self.counting);
         // What the device wrote becomes visible to the host, checkpoints and read-back buffers alike.
         let to_host = MemoryBarrier {

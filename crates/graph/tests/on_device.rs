@@ -61,39 +61,37 @@ fn expected_pixel(x: u32, y: u32, shift: u32) -> [u8; 4] {
 }
 
 /// Clear, compute, compute, raster and copies, twice over, with memory that is shared along the way.
-fn chain(g: &mut Graph, name: &str, shift: u32) -> ImageHandle {
+fn chain(g: &mut Graph, name: &str, (role, holds): (PassRole, BufferRole), shift: u32) -> ImageHandle {
     let pixels = u64::from(WIDTH * HEIGHT);
-    let values = g.buffer(&format!("{name}/values"), BufferRole::Lights, pixels * 4);
-    let values = g.clear_buffer(&format!("{name}/clear"), PassRole::Upkeep, values, 7);
-    let mut pass = g.compute(&format!("{name}/pattern"), PassRole::LightAssignment, &shader("pattern.comp"));
+    let values = g.buffer(&format!("{name}/values"), holds, pixels * 4);
+    let values = g.clear_buffer(&format!("{name}/clear"), role, values, 7);
+    let mut pass = g.compute(&format!("{name}/pattern"), role, &shader("pattern.comp"));
     let values = pass.constant("SHIFT", shift).push(&[WIDTH, HEIGHT]).write("Values", values);
     pass.dispatch(groups(WIDTH, HEIGHT));
-    let copied = g.buffer(&format!("{name}/copied"), BufferRole::Lights, pixels * 4);
-    let copied = g.copy_buffer(&format!("{name}/copy"), PassRole::Upkeep, &values, copied);
-    let painted =
-        g.image(&format!("{name}/painted"), BufferRole::Targets, ImageInfo::new(COLOR, WIDTH, HEIGHT));
-    let mut pass = g.compute(&format!("{name}/paint"), PassRole::LightAssignment, &shader("paint.comp"));
+    let copied = g.buffer(&format!("{name}/copied"), holds, pixels * 4);
+    let copied = g.copy_buffer(&format!("{name}/copy"), role, &values, copied);
+    let painted = g.image(&format!("{name}/painted"), holds, ImageInfo::new(COLOR, WIDTH, HEIGHT));
+    let mut pass = g.compute(&format!("{name}/paint"), role, &shader("paint.comp"));
     pass.read("Values", &copied);
     let painted = pass.write("painted", painted);
     pass.dispatch(groups(WIDTH, HEIGHT));
-    let target =
-        g.image(&format!("{name}/target"), BufferRole::Targets, ImageInfo::new(COLOR, WIDTH, HEIGHT));
-    let mut pass = g.raster(&format!("{name}/show"), PassRole::Shading);
+    let target = g.image(&format!("{name}/target"), holds, ImageInfo::new(COLOR, WIDTH, HEIGHT));
+    let mut pass = g.raster(&format!("{name}/show"), role);
     pass.read_sampled("source", &painted, SamplerDesc::NEAREST);
     let target = pass.color(target, Load::DontCare);
     let state = RasterState::new(&shader("triangle.vert"), Some(&shader("copy.frag")));
     pass.draw(covering(0.0, state));
-    let last = g.image(&format!("{name}/last"), BufferRole::Targets, ImageInfo::new(COLOR, WIDTH, HEIGHT));
-    g.copy_image(&format!("{name}/copy image"), PassRole::Upkeep, &target, last)
+    let last = g.image(&format!("{name}/last"), holds, ImageInfo::new(COLOR, WIDTH, HEIGHT));
+    g.copy_image(&format!("{name}/copy image"), role, &target, last)
 }
 
 #[test]
 fn a_chain_with_shared_memory_gives_the_right_pixels() {
     let Some(device) = open() else { return };
     let mut g = Graph::new();
-    let first = chain(&mut g, "first", 3);
+    let first = chain(&mut g, "first", (PassRole::Shading, BufferRole::Targets), 3);
     g.keep(&first);
-    let second = chain(&mut g, "shared/second", 200);
+    let second = chain(&mut g, "shared/second", (PassRole::Shared, BufferRole::Shared), 200);
     g.keep(&second);
     g.mark_output(&second);
     let plan = g.plan(&device).expect("a valid frame");
@@ -398,7 +396,7 @@ fn resources_from_outside_keep_their_contents_and_layout() {
 fn validation_sees_a_dropped_barrier() {
     let Some(device) = open() else { return };
     let mut g = Graph::new();
-    let last = chain(&mut g, "chain", 0);
+    let last = chain(&mut g, "chain", (PassRole::Shading, BufferRole::Targets), 0);
     g.keep(&last);
     let sound = g.plan(&device).expect("a valid frame");
     for (index, pass) in ["chain/pattern", "chain/copy", "chain/show"].iter().enumerate() {
@@ -422,7 +420,7 @@ fn twenty_passes_are_recorded_quickly() {
     };
     let mut g = Graph::new();
     for index in 0..4 {
-        let last = chain(&mut g, &format!("chain{index}"), index);
+        let last = chain(&mut g, &format!("chain{index}"), (PassRole::Shading, BufferRole::Targets), index);
         g.keep(&last);
     }
     let plan = g.plan(&device).expect("a valid frame");

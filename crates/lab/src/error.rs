@@ -37,10 +37,10 @@ pub enum LabError {
     Gpu(#[from] GpuError),
     /// The frame graph.
     #[error(transparent)]
-    Graph(#[from] GraphError),
+    Graph(Box<GraphError>),
     /// A technique, or its parameters.
     #[error(transparent)]
-    Technique(#[from] TechniqueError),
+    Technique(Box<TechniqueError>),
     /// Images that cannot be compared or encoded.
     #[error(transparent)]
     Image(#[from] ImageError),
@@ -61,6 +61,18 @@ pub enum LabError {
         /// Why.
         reason: String,
     },
+}
+
+impl From<GraphError> for LabError {
+    fn from(error: GraphError) -> LabError {
+        LabError::Graph(Box::new(error))
+    }
+}
+
+impl From<TechniqueError> for LabError {
+    fn from(error: TechniqueError) -> LabError {
+        LabError::Technique(Box::new(error))
+    }
 }
 
 impl LabError {

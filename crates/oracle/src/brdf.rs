@@ -97,7 +97,7 @@ pub fn illuminance(light: &Light, position_ws: DVec3) -> (DVec3, DVec3) {
         return (intensity, -direction_ws);
     }
     let offset = light.position_ws.as_dvec3() - position_ws;
-    // a light in the very surface: at least a tenth of a millimetre away
+    // a light that lies in the surface is taken to be a tenth of a millimetre away
     let distance_sq = offset.length_squared().max(1e-8);
     let to_light = offset / distance_sq.sqrt();
     let falloff = range_window(distance_sq.sqrt(), f64::from(light.range_m)) / distance_sq;

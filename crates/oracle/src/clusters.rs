@@ -1,8 +1,8 @@
 //! Light culling by cells: which lights touch a part of the view, a tile between two view distances, decided in f64.
 //!
 //! The sphere around what a light reaches touches a cell where it meets the box around the cell along the camera's axes and is outside
-//! of none of the four planes at its sides: each lets pass some that the other does not, at the corners, neither misses one. The cone
-//! of a spot light must also come within the radius of the sphere around the cell's corners.
+//! of none of the four planes at its sides. At corners each test rejects spheres that the other would pass; neither misses a light that
+//! touches the cell. The cone of a spot light must also come within the radius of the sphere around the cell's corners.
 
 use afterlight_scene::{Camera, Light, LightKind};
 use glam::{DMat4, DVec2, DVec3, DVec4};

@@ -177,7 +177,7 @@ impl<'a> RayScene<'a> {
         if !(u >= 0.0 && v >= 0.0 && u + v <= 1.0 && in_range) {
             return None;
         }
-        // positive where the corners run counter-clockwise; a mirroring instance turns that
+        // positive if the corners run counter-clockwise; a mirrored instance flips the sign
         let mirrored = widened(&self.scene.instances[triangle.instance as usize]).determinant() < 0.0;
         let front = (determinant > 0.0) != mirrored;
         if !front && !self.material(triangle.instance).double_sided {

@@ -106,7 +106,7 @@ impl Rsm {
             ),
             _ => 1.0,
         };
-        // An area of the plane at distance 1, seen at this cosine from 1 / cosine away.
+        // Solid angle of an area of the plane at distance 1, which is seen at this cosine from a distance of 1 / cosine.
         let cosine = -(self.view_from_world.transform_vector3(direction)).z;
         let solid_angle = texel_area * cosine.powi(3);
         intensity * range_window(offset.length(), light.range_m.into()) * angular * solid_angle
@@ -136,7 +136,7 @@ impl Rsm {
         for (offset, weight) in &pattern.samples {
             let Some(light) = self.texel(place + *offset) else { continue };
             let texels = disc_texels * weight / weights;
-            // No nearer than the radius of a disc of as many texels.
+            // The distance is at least the radius of a disc with the area of the texels that the sample stands for.
             let least_m = texel_side_m * (texels / PI).sqrt();
             sum += texels * pixel_irradiance(position_ws, normal_ws, light, least_m);
         }

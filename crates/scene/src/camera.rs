@@ -125,7 +125,7 @@ fn interior_camera(scene: &Scene, bounds_ws: &Aabb, near_m: f32) -> Camera {
     }
     let mut center_ws = bounds_ws.center();
     center_ws.y = bounds_ws.min.y + height_m;
-    // 0.9: an eye at the very wall sees it cut by the near plane when the view turns
+    // 0.9: an eye closer to the wall would see it cut by the near plane when the view turns
     let free_m = [axis_ws, -axis_ws].map(|d| 0.9 * first_hit_m(scene, center_ws, d).min(half_m));
     let (back_ws, back_m) = if free_m[0] > free_m[1] { (axis_ws, free_m[0]) } else { (-axis_ws, free_m[1]) };
     let eye_ws = center_ws + back_m * back_ws;
@@ -138,7 +138,7 @@ fn interior_camera(scene: &Scene, bounds_ws: &Aabb, near_m: f32) -> Camera {
 /// outer walls of a building do not. Triangles seen edge-on tell nothing, double-sided ones count half.
 fn is_interior(scene: &Scene, point_ws: Vec3) -> bool {
     let total = scene.triangle_count();
-    // odd, so that quads split in two triangles are not seen by one half alone
+    // odd, so that rays do not all hit the same half of quads that are split into two triangles
     let stride = (total.div_ceil(INTERIOR_TRIANGLES_MAX) | 1) as usize;
     let mut nearest = [(f32::INFINITY, 0.0f32); DIRECTION_BINS];
     let mut skip = 0;

@@ -133,8 +133,8 @@ pub(crate) fn resolve_uri(file: &Path, uri: &str) -> Option<PathBuf> {
         return None;
     }
     let decoded = percent_decode(uri.split(['?', '#']).next().unwrap_or(uri));
-    // A name that holds a literal ? or # unescaped is against the rules but common: the whole
-    // name is meant where such a file exists.
+    // A URI with an unescaped ? or # in its file name breaks the rules but is common: where a
+    // file of the whole name exists, that file is meant.
     let folder = file.parent().unwrap_or(Path::new(""));
     let whole = folder.join(percent_decode(uri)?);
     if uri.contains(['?', '#']) && whole.is_file() {

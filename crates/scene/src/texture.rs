@@ -348,7 +348,7 @@ fn renormalize(texel: &mut [u16; 4]) {
     const HALF: f32 = 32767.5;
     let [x, y, z] = [texel[0], texel[1], texel[2]].map(|v| f32::from(v) - HALF);
     let z = z.max(0.0);
-    // values are whole and the middle is not: x and y are never 0, nor is the length
+    // bytes are whole numbers and the middle, 127.5, is not: x, y and the length are never 0
     let scale = HALF / (x * x + y * y + z * z).sqrt();
     let unit = |v: f32| round_u16(v * scale + HALF);
     *texel = [unit(x), unit(y), unit(z), texel[3]];

@@ -1,4 +1,4 @@
-// Reads of the G-buffer what the lobes of the BRDF need, not its colours.
+// Reads from the G-buffer what the BRDF's lobes need (position, normal, roughness), without the colours.
 #ifndef AFTERLIGHT_GBUFFER_LOBE
 #define AFTERLIGHT_GBUFFER_LOBE
 #include "shading.glsl"

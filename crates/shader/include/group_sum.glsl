@@ -1,5 +1,5 @@
-// Sums over a group of 256 threads that end at the greatest number instead of beginning again at 0: what does not fit must not
-// look as if it did.
+// Sums over a group of 256 threads. A sum that overflows stays at the largest number instead of wrapping around to 0: a list that does
+// not fit must not look as if it did.
 #ifndef AFTERLIGHT_GROUP_SUM
 #define AFTERLIGHT_GROUP_SUM
 
@@ -11,7 +11,7 @@ uint saturating_add(uint a, uint b) {
     return sum < a ? 0xffffffffu : sum;
 }
 
-// Sum of the threads before this one; `total` is that of all. Hillis and Steele's scan.
+// The sum over the threads before this one (Hillis and Steele's scan); `total` is the sum over all.
 uint sum_before(uint own, out uint total) {
     uint lane = gl_LocalInvocationID.x;
     sums[lane] = own;
@@ -26,7 +26,7 @@ uint sum_before(uint own, out uint total) {
     return lane == 0u ? 0u : sums[lane - 1u];
 }
 
-// First and end of the elements of this thread, of `count` in all.
+// The range of elements, first and end, that this thread handles of `count` in all.
 uvec2 elements_of_thread(uint count) {
     uint a_thread = (count + 255u) / 256u;
     uint first = min(gl_LocalInvocationID.x * a_thread, count);

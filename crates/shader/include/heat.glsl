@@ -10,7 +10,7 @@ vec3 sample_usage_color(uint used, uint all) {
     return vec3(float(used - 1u) / float(max(all, 2u) - 1u), 0.0, 0.0);
 }
 
-// Black 0, blue 1, green 2, yellow 3, red 4, white 5; straight between them.
+// Black at 0, blue at 1, green at 2, yellow at 3, red at 4, white at 5; interpolated linearly in between.
 vec3 heat(float t) {
     const vec3 STOPS[6] = vec3[](vec3(0.0), vec3(0.0, 0.0, 0.6), vec3(0.0, 0.6, 0.1), vec3(0.9, 0.8, 0.0),
                                  vec3(0.8, 0.0, 0.0), vec3(1.0));
@@ -29,8 +29,8 @@ vec3 sharing_color(float log2_count) {
     return heat(1.0 + log2_count / 4.0);
 }
 
-// Black 0, blue 1, green 8 (as many as seeded lights reach a surface), yellow 64, red 512, white 4,096 and more; below 1, means over
-// samples, straight from black.
+// Black 0, blue 1, green 8 (as many as seeded lights reach a surface), yellow 64, red 512, white 4,096 and more; means over
+// samples can be below 1: these are interpolated linearly from black.
 vec3 pairs_color(float count) {
     return heat(count < 1.0 ? count : 1.0 + log2(count) / 3.0);
 }

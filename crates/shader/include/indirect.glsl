@@ -7,7 +7,7 @@
 #include "frame.glsl"
 #include "material.glsl"
 
-// 0 where there is no indirect light, so that all of this goes.
+// 0 where there is no indirect light: the compiler then removes all of this code.
 layout(constant_id = 7) const uint INDIRECT_SAMPLES = 0u;
 
 struct RsmConstants {
@@ -60,7 +60,7 @@ vec3 gathered_irradiance(Surface s, uint first, uint end) {
 }
 
 #ifdef LOW_RATE
-// Of the surface that is shaded: whoever shades has found it before (dais_multirate/low_rate.glsl).
+// Irradiance of the surface that is shaded, which the shader has found before (dais_multirate/low_rate.glsl).
 vec3 low_rate_irradiance;
 
 vec3 indirect_irradiance(Surface s) {
@@ -72,7 +72,7 @@ vec3 indirect_irradiance(Surface s) {
 }
 #endif
 
-// Radiance towards the eye by light that one surface has reflected before, of the diffuse lobe alone.
+// Radiance towards the eye from light that another surface has reflected once; the diffuse lobe only.
 vec3 indirect_radiance(Surface s) {
     return s.base_color * ((1.0 - s.metallic) * s.occlusion / PI) * indirect_irradiance(s);
 }

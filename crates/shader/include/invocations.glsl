@@ -1,10 +1,11 @@
-// Counts runs of a fragment shader, a pixel; with COUNT_INVOCATIONS alone.
+// Counts how often the fragment shader runs in each pixel; only with COUNT_INVOCATIONS.
 #ifndef AFTERLIGHT_INVOCATIONS
 #define AFTERLIGHT_INVOCATIONS
 
 #ifdef COUNT_INVOCATIONS
 #ifndef ALPHA_MASK
-// A shader with stores is tested late unless it says otherwise: hidden fragments would count. With an alpha test they do.
+// A fragment shader that stores is depth-tested after it runs unless it asks for early tests; hidden fragments would be counted too.
+// Shaders with an alpha test cannot ask for early tests, so that their hidden fragments are counted.
 layout(early_fragment_tests) in;
 #endif
 layout(set = 0, binding = 14, r32ui) uniform uimage2D invocation_count;

@@ -10,7 +10,7 @@ bool light_cone(uint index, out vec3 apex, out vec3 axis, out float cos_angle) {
     if (ONLY_POINT_LIGHTS != 0u || light_kind(index) != LIGHT_SPOT) {
         return false;
     }
-    // The falloff cos x scale + offset ends where it is 0.
+    // The cone ends where the falloff, cosine x scale + offset, reaches 0.
     vec4 falloff = light_texel(index, 3u);
     apex = light_texel(index, 0u).xyz;
     axis = light_texel(index, 2u).xyz;

@@ -9,7 +9,7 @@ const mat3 REC709_FROM_XYZ = mat3(3.2409699, -0.9692436, 0.0556301, -1.5373832, 
 uint logluv_encode(vec3 rgb) {
     vec3 xyz = XYZ_FROM_REC709 * rgb;
     if (!(xyz.y > 5.5e-20)) {
-        return 0u;      // below 2^-64, or no number
+        return 0u;      // below 2^-64, or not a number
     }
     uint luminance = uint(clamp(256.0 * (log2(xyz.y) + 64.0), 1.0, 32767.0));
     vec2 uv = vec2(4.0, 9.0) * xyz.xy / (xyz.x + 15.0 * xyz.y + 3.0 * xyz.z);

@@ -2,8 +2,8 @@
 //
 // A shader that samples in uniform quads (fragment shaders) uses implicit derivatives; with EXPLICIT_GRADIENTS the
 // derivatives come with the coordinates. Textures stand in arrays ("buckets") of one size, format and sampler,
-// because lavapipe has no descriptor indexing: the bucket is picked by comparisons that vanish for buckets that the
-// scene does not have.
+// because lavapipe has no descriptor indexing. The bucket is picked by comparisons; the compiler removes those for buckets
+// that the scene does not have.
 #ifndef AFTERLIGHT_MATERIAL
 #define AFTERLIGHT_MATERIAL
 #include "scene.glsl"
@@ -36,7 +36,7 @@ struct TextureCoordinates {
     vec2 ddy;
 };
 
-// What interpolation gives for a point of a triangle.
+// Attributes interpolated at a point of a triangle.
 struct SurfacePoint {
     vec3 position_ws;
     vec3 normal_ws;     // interpolated, not unit
@@ -153,7 +153,7 @@ vec3 mapped_normal(MaterialData m, SurfacePoint p) {
         vec2 xy = sample_normal(m.normal_slot, coordinates_for(p, m, m.normal_slot, 2u)) * 2.0 - 1.0;
         float z = sqrt(max(1.0 - dot(xy, xy), 0.0));
         xy *= m.normal_scale;
-        // Basis as MikkTSpace has it: interpolated vectors, not made unit before use.
+        // MikkTSpace builds the basis from the interpolated vectors without normalising them first.
         vec3 bitangent = p.tangent_ws.w * cross(p.normal_ws, p.tangent_ws.xyz);
         n = xy.x * p.tangent_ws.xyz + xy.y * bitangent + z * p.normal_ws;
     }
@@ -161,7 +161,7 @@ vec3 mapped_normal(MaterialData m, SurfacePoint p) {
     return p.front_facing ? n : -n;
 }
 
-// The surface at a point, its base colour known already (an alpha test needs it first).
+// The surface at a point. The caller passes the base colour, which an alpha test has needed before.
 Surface surface_at(MaterialData m, SurfacePoint p, vec3 base_color) {
     Surface s;
     s.position_ws = p.position_ws;

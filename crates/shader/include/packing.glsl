@@ -21,7 +21,7 @@ vec3 unpack_normal(uint bits) {
     return octahedral_decode(unpackSnorm2x16(bits));
 }
 
-// Tangent, and in w the sign of the bitangent, which takes the place of y's lowest bit.
+// The tangent, and in w the sign of the bitangent, which is stored in the lowest bit of y.
 vec4 unpack_tangent(uint bits) {
     return vec4(octahedral_decode(unpackSnorm2x16(bits & ~0x10000u)), (bits & 0x10000u) != 0u ? -1.0 : 1.0);
 }

@@ -1,7 +1,7 @@
 // The scene's records: draws and materials.
 //
-// They stand in RGBA32UI images, rows of 1,024 texels: a texel comes with one vector load where lavapipe reads a buffer word
-// by word and lane by lane. Twins: DrawData and MaterialData in crates/shader/src/structs.rs, whose tests hold the texels.
+// They are stored in RGBA32UI images with rows of 1,024 texels, because lavapipe loads a texel with one vector instruction but a
+// buffer word by word and lane by lane. Twins: DrawData and MaterialData in crates/shader/src/structs.rs, whose tests hold the texels.
 #ifndef AFTERLIGHT_SCENE
 #define AFTERLIGHT_SCENE
 #extension GL_EXT_samplerless_texture_functions : require
@@ -45,7 +45,7 @@ struct MaterialData {
 const uint MATERIAL_UNLIT = 1u;
 const uint MATERIAL_DOUBLE_SIDED = 2u;
 
-// A degenerate transform may leave no direction: zero then, not NaN.
+// A degenerate transform may map a direction to zero: return zero then, not NaN.
 vec3 unit_or_zero(vec3 v) {
     return v * inversesqrt(max(dot(v, v), 1e-30));
 }
@@ -69,13 +69,13 @@ MaterialData load_material_from(utexture2D image, uint index) {
                         factors.w, a.x, a.y, a.z, a.w, b.x, b.y, b.z, b.w);
 }
 
-// Normal matrix times n: the cofactor matrix, turned where the draw is mirrored, so that an outward normal stays one.
+// Normal matrix times n. It is the cofactor matrix, negated where the draw is mirrored, so that outward normals stay outward.
 vec3 normal_to_world(vec4 r0, vec4 r1, vec4 r2, bool mirrored, vec3 n) {
     vec3 world = vec3(dot(cross(r1.xyz, r2.xyz), n), dot(cross(r2.xyz, r0.xyz), n), dot(cross(r0.xyz, r1.xyz), n));
     return unit_or_zero(mirrored ? -world : world);
 }
 
-// Tangent in world space and the bitangent's sign there; mirroring turns the sign.
+// The tangent in world space, and the sign of the bitangent, which mirroring flips.
 vec4 tangent_to_world(vec4 r0, vec4 r1, vec4 r2, bool mirrored, vec4 t) {
     vec3 world = vec3(dot(r0.xyz, t.xyz), dot(r1.xyz, t.xyz), dot(r2.xyz, t.xyz));
     return vec4(unit_or_zero(world), mirrored ? -t.w : t.w);

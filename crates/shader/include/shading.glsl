@@ -12,10 +12,10 @@
 #include "light_pairs.glsl"
 #include "shadow.glsl"
 
-// Perceptual roughness below this makes highlights that neither pixels nor 32-bit floats resolve.
+// Lowest perceptual roughness. Below it highlights are smaller than pixels, and 32-bit floats lose their peak.
 const float MIN_ROUGHNESS = 0.045;
 
-// A surface with what its BRDF reuses for every light.
+// A surface, and the terms of its BRDF that are the same for every light.
 struct ShadingPoint {
     vec3 position_ws;
     vec3 normal_ws;
@@ -25,10 +25,10 @@ struct ShadingPoint {
     float alpha_sq;
     float n_dot_v;
     float v_term;       // sqrt of the view half of the Smith term
-    float lit;          // share that arrives of the light that has shadows
+    float lit;          // fraction that arrives of the one light that casts shadows
 };
 
-// Under lights without shadows.
+// The shading point without shadows: every light arrives in full.
 ShadingPoint unshadowed_point(Surface s) {
     ShadingPoint p;
     p.position_ws = s.position_ws;
@@ -45,8 +45,8 @@ ShadingPoint unshadowed_point(Surface s) {
     return p;
 }
 
-// Under all lights. The shadow map is asked here and not in their loop: a device that runs both sides of a branch would ask it for
-// every light.
+// The shading point for all lights. The shadow map is sampled once here and not in the loop over lights: a device that runs both sides of
+// a branch would sample it for every light.
 ShadingPoint shading_point(Surface s) {
     ShadingPoint p = unshadowed_point(s);
     if (SHADOWS > 0u) {
@@ -55,7 +55,7 @@ ShadingPoint shading_point(Surface s) {
     return p;
 }
 
-// Under light number `index` alone.
+// The shading point for light number `index` only.
 ShadingPoint shading_point_for(Surface s, uint index) {
     ShadingPoint p = unshadowed_point(s);
     if (SHADOWS > 0u && index == shadow.light_index) {
@@ -64,9 +64,9 @@ ShadingPoint shading_point_for(Surface s, uint index) {
     return p;
 }
 
-// What a light from the unit direction l gives, apart from the colours of the surface: the BRDF times cosine is
-// (1 - f0) diffuse x + f0 y + z, by Schlick's F = f0 + (1 - f0) c^5 with c = 1 - v.h. x: (1 - c^5) n.l; y: (1 - c^5) D V n.l;
-// z: c^5 D V n.l.
+// The three factors of the BRDF that do not depend on the surface's colours, for light from the unit direction l. With Schlick's
+// F = f0 + (1 - f0) c^5, c = 1 - v.h, the BRDF times cosine is (1 - f0) diffuse x + f0 y + z, where x = (1 - c^5) n.l,
+// y = (1 - c^5) D V n.l and z = c^5 D V n.l.
 vec3 lobes(ShadingPoint p, vec3 l) {
     float n_dot_l = dot(p.normal_ws, l);
     if (n_dot_l <= 0.0) {
@@ -88,7 +88,7 @@ vec3 lobes(ShadingPoint p, vec3 l) {
     return vec3(1.0 - grazing, (1.0 - grazing) * specular, grazing * specular) * n_dot_l;
 }
 
-// What a surface's colours make of light that came as the three parts of lobes(), each in RGB.
+// Applies a surface's colours to light that was summed separately for the three factors of lobes(), each in RGB.
 vec3 reflected(ShadingPoint p, vec3 diffuse, vec3 specular, vec3 grazing) {
     if (LIGHT_PAIRS > 0u) {
         return diffuse;     // light_prepass/light.frag counts there
@@ -102,8 +102,8 @@ vec3 reflectance(ShadingPoint p, vec3 l) {
     return reflected(p, part.xxx, part.yyy, part.zzz);
 }
 
-// Light number `index` at a surface: the unit direction to it and what arrives across that direction, W/m^2 or lux. False beyond its
-// range; nothing in its shadow where it has one.
+// The unit direction to light number `index` and its irradiance across that direction, W/m^2 or lux. Returns false beyond the light's
+// range; where the light casts shadows, the irradiance is scaled by what arrives.
 bool light_arrives(ShadingPoint p, uint index, out vec3 l, out vec3 irradiance) {
     vec4 place = light_texel(index, 0u);
     vec3 to_light = place.xyz - p.position_ws;
@@ -137,7 +137,7 @@ bool light_arrives(ShadingPoint p, uint index, out vec3 l, out vec3 irradiance) 
     return true;
 }
 
-// Radiance towards the eye that light number `index` causes, or the count of that pair.
+// Radiance towards the eye caused by light number `index`; where pairs are counted, the count of this pair instead.
 vec3 light_radiance(ShadingPoint p, uint index) {
     vec3 l, irradiance;
     bool lit = light_arrives(p, index, l, irradiance);
@@ -156,8 +156,8 @@ vec3 all_lights_radiance(ShadingPoint p) {
     return radiance;
 }
 
-// Radiance that needs no light of the list: emission, the constant ambient term, and indirect light where it is asked for; or the
-// base colour of an unlit surface. A white surface reflects as much as reaches it. Nothing where pairs are counted.
+// Radiance that no light of the list causes: emission, the constant ambient term, and indirect light where it is enabled; of an unlit
+// material its base colour. A white surface reflects all the ambient light that reaches it. Zero where pairs are counted.
 vec3 unlit_radiance(Surface s) {
     if (LIGHT_PAIRS > 0u) {
         return vec3(0.0);

@@ -5,7 +5,7 @@
 #define AFTERLIGHT_SHADOW
 #include "frame.glsl"
 
-// 0 where there are no shadows, so that all of this goes.
+// 0 where there are no shadows: the compiler then removes all of this code.
 layout(constant_id = 22) const uint SHADOWS = 0u;
 
 struct ShadowConstants {
@@ -21,9 +21,9 @@ layout(set = 0, binding = 24, scalar) uniform ShadowBlock {
 // Depth of what the light sees, 1 near, 0 where it sees nothing.
 layout(set = 0, binding = 25) uniform texture2D shadow_map;
 
-// Share of the light that reaches a point: that of a square of two by two texels around its place in the map whose surfaces are
-// not nearer to the light. Each of the nine texels counts by its area in the square, so that the share is continuous. Lit where
-// the map does not reach.
+// Fraction of the light that reaches a point: the part of a square of 2 x 2 texels around the point in the map whose stored surfaces are
+// not nearer to the light. Each of the nine texels that the square touches counts by the area that it has in the square, so that the
+// fraction is continuous. Points outside of the map are lit.
 float lit_share(vec3 position_ws) {
     vec4 p = shadow.texel_from_world * vec4(position_ws, 1.0);
     vec2 place = p.xy / p.w;

@@ -1,4 +1,4 @@
-// Shading of one pixel a thread by the lights of its tile. Needs tiles.glsl and shading.glsl.
+// Shades one pixel in each thread by the lights of its tile. Needs tiles.glsl and shading.glsl.
 #ifndef AFTERLIGHT_TILED_SHADING
 #define AFTERLIGHT_TILED_SHADING
 #include "shading.glsl"

@@ -90,8 +90,8 @@ bool triangle_at(uint id, vec2 ndc, out float depth) {
     return all(greaterThanEqual(b, vec3(0.0))) && w > 0.0;
 }
 
-// Changes of the texture coordinates as a quad of fragments has them: differences between its upper left pixel and those
-// beside it and below. In place of the analytic ones where a decision must fall as it does in a fragment shader.
+// Derivatives of the texture coordinates as a quad of fragments computes them: differences between its upper left pixel and the pixels
+// beside and below it. Used instead of the analytic ones where a test (alpha) must give the same result as in a fragment shader.
 void take_quad_gradients(uint id, uvec2 pixel, inout SurfacePoint p) {
     DrawData d = load_draw(draw_data, id >> TRIANGLE_BITS);
     uvec3 v = triangle_vertices(id, d);

@@ -41,6 +41,29 @@ fn workload() -> Workload {
     }
 }
 
+/// Where a formula departs from the paper, the difference is the one that its documentation states.
+#[test]
+fn departures_from_the_paper_are_those_that_are_stated() {
+    let w = workload();
+    // DPP: o·o_cmd + o·l·o_cmd commands and one light a pixel in the paper; 2·o·o_cmd and l lights a pixel here.
+    let dpp = depth_prepass(&w);
+    let paper = Cost {
+        cmd: w.objects * w.object_command * (1.0 + w.lights),
+        proc: 2.0 * w.vertices() + w.pixels * w.evaluation,
+        ..dpp
+    };
+    assert_eq!(paper.cmd - dpp.cmd, w.objects * w.object_command * (w.lights - 1.0));
+    assert_eq!(dpp.proc - paper.proc, w.pixels * w.evaluation * (w.lights - 1.0));
+    // LiD: 4p in the paper; the paper's own packing, one float of indices, gives the same.
+    assert_eq!(light_indexed(&w, 1.0).mem, 4.0 * w.pixels);
+    assert_eq!(light_indexed(&w, 2.0).mem - 4.0 * w.pixels, w.pixels);
+    // D++: the two senses of t are two symbols, so that one may change without the other.
+    let more_tiles = visibility_buffer(&Workload { tiles: 2.0 * w.tiles, ..w });
+    assert_eq!(more_tiles.cmd - visibility_buffer(&w).cmd, w.tiles * w.tile_command);
+    let smaller_tiles = visibility_buffer(&Workload { pixels_a_tile: 0.5 * w.pixels_a_tile, ..w });
+    assert_eq!(smaller_tiles.cmd, visibility_buffer(&w).cmd);
+}
+
 /// Worked by hand from the paper's formulas.
 #[test]
 fn formulas_give_the_papers_terms() {

@@ -55,8 +55,9 @@ fn other_samples_text(run: &Run, found: &Conclusion<'_>) -> String {
     let (last, others) = counts.split_last().map_or((String::new(), &[][..]), |(l, o)| (l.clone(), o));
     let counts = if others.is_empty() { last } else { format!("{} or {last}", others.join(", ")) };
     format!(
-        "not at {} sample(s) a pixel, but with --samples {counts}: {}\n",
+        "not at {} sample{} a pixel, but with --samples {counts}: {}\n",
         run.settings.samples,
+        if run.settings.samples == 1 { "" } else { "s" },
         names.join(", ")
     )
 }
@@ -122,12 +123,12 @@ mod tests {
     fn the_summary_is_last_and_by_frame_time() {
         let text = compare_text(&run(), false);
         let at = |part: &str| text.find(part).unwrap_or_else(|| panic!("no {part} in:\n{text}"));
-        assert!(at("tiled") < at("deferred") && at("deferred") < at("forward  "), "{text}");
+        assert!(at("\n tiled") < at("\n deferred") && at("\n deferred") < at("\n forward"), "{text}");
         let lines: Vec<&str> = text.lines().collect();
         let [.., other, fastest, least] = &lines[..] else { panic!("{text}") };
         assert_eq!(
             *other,
-            "not at 1 sample(s) a pixel, but with --samples 2, 4, 8 or 16: deferred-dedup, dais-list"
+            "not at 1 sample a pixel, but with --samples 2, 4, 8 or 16: deferred-dedup, dais-list"
         );
         assert_eq!(*fastest, "fastest exact technique: tiled, 4.00 ms, 4.00 KiB");
         assert!(

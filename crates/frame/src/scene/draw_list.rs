@@ -13,9 +13,13 @@ use crate::{
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct DrawCommand {
+    /// Indices of the draw.
     pub index_count: u32,
+    /// Always 1.
     pub instance_count: u32,
+    /// First index in the scene's index buffer.
     pub first_index: u32,
+    /// Added to every index.
     pub vertex_offset: i32,
     /// The draw's number: instances are draws.
     pub first_instance: u32,
@@ -26,14 +30,18 @@ pub const COMMAND_BYTES: u64 = size_of::<DrawCommand>() as u64;
 
 /// Indirect commands of a view, one range of the buffer a bucket, and their counts.
 pub struct DrawList {
+    /// A [`DrawCommand`] a draw in view.
     pub commands: gpu::Buffer,
+    /// Number of commands of each bucket, 32 bits each.
     pub counts: gpu::Buffer,
+    /// How draws are chosen and ordered.
     pub options: DrawParams,
     /// Draws in view, by bucket, in drawing order.
     pub visible: [Vec<u32>; BUCKETS],
 }
 
 impl DrawList {
+    /// An empty list with room for every draw of a scene.
     pub fn new(device: &gpu::Device, scene: &SceneGpu, options: DrawParams) -> Result<Self, gpu::GpuError> {
         let buffer = |name, bytes| {
             device.create_buffer(&gpu::BufferDesc {

@@ -17,10 +17,15 @@ pub const BUCKETS: usize = 8;
 /// What of a draw the CPU needs: for culling, sorting and the indirect command.
 #[derive(Clone, Copy, Debug)]
 pub struct DrawInfo {
+    /// Bounds, world space.
     pub bounds_ws: Aabb,
+    /// Indices, three a triangle.
     pub index_count: u32,
+    /// First index in the scene's index buffer.
     pub first_index: u32,
+    /// Added to every index.
     pub first_vertex: u32,
+    /// Textures that a fragment reads.
     pub fetches: TextureFetches,
 }
 
@@ -56,12 +61,15 @@ impl Bucket {
     /// Opaque and double-sided: a state that drops no face.
     pub const DOUBLE_SIDED: Self = Self(2);
 
+    /// Whether fragments are tested by alpha.
     pub fn masked(self) -> bool {
         self.0 & 4 != 0
     }
+    /// Whether back faces are drawn.
     pub fn double_sided(self) -> bool {
         self.0 & 2 != 0
     }
+    /// Whether the instance is mirrored, so that its front faces turn clockwise.
     pub fn mirrored(self) -> bool {
         self.0 & 1 != 0
     }

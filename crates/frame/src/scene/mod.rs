@@ -30,8 +30,11 @@ use crate::{
 /// A scene uploaded once and shared by all techniques. Draws with alpha blending stand apart, after the others: techniques do not
 /// see them, [`afterlight_stages::compose::transparent`] draws them.
 pub struct SceneGpu {
+    /// Positions of vertices, object space, 12 bytes each.
     pub positions: gpu::Buffer,
+    /// Other attributes of vertices, 28 bytes each.
     pub attributes: gpu::Buffer,
+    /// Indices of triangles, 32 bits each.
     pub indices: gpu::Buffer,
     /// One `DrawData` a draw, those with alpha blending last: the vertex stream of instances.
     pub draws: gpu::Buffer,
@@ -39,7 +42,9 @@ pub struct SceneGpu {
     pub draw_data: gpu::Image,
     /// Eight texels a material.
     pub materials: gpu::Image,
+    /// Rows of texture transforms.
     pub uv_transforms: gpu::Buffer,
+    /// The scene's textures.
     pub texture_set: gpu::DescriptorSet,
     /// Specialization constants that fit the scene, by name.
     pub constants: Vec<(&'static str, u32)>,
@@ -47,6 +52,7 @@ pub struct SceneGpu {
     pub has_emission: bool,
     /// Name of the node, and of the material, of each draw.
     pub draw_names: Vec<[Arc<str>; 2]>,
+    /// What the CPU needs of the draws in buckets.
     pub draw_infos: Vec<DrawInfo>,
     /// First draw of each bucket; one more entry for the end.
     pub bucket_first: [u32; BUCKETS + 1],

@@ -14,8 +14,9 @@
 #include "surfaces/geometry/whole_triangle.glsl"
 #endif
 
-// Triangle ID and its place, two entries a bucket. Written place first, ID last; an ID that is being replaced is none. Volatile:
-// a look-up reads the ID twice, and a compiler that joins the reads takes another triangle's place (32 dB on lavapipe).
+// Triangle ID and its place, two entries in each bucket. The place is written first and the ID last; while an entry is replaced its ID is
+// NO_ID. It is volatile because a look-up reads the ID twice: a compiler that merged the two reads would return another triangle's
+// place (32 dB on lavapipe).
 layout(set = 0, binding = 10, scalar) coherent volatile buffer CacheEntries {
     uvec2 cache_entries[];
 };
@@ -34,9 +35,9 @@ layout(constant_id = 12) const uint CACHE_BUCKETS = 8192u;
 layout(constant_id = 13) const uint POLLS = 32u;
 
 const uint NOT_CACHED = 0xffffffffu;
-const uint NO_ID = 0u;      // the cleared cache; IDs are stored plus one
+const uint NO_ID = 0u;      // value of the cleared cache; IDs are stored plus one
 
-// Neighbouring triangles, which are drawn at the same time, spread over the buckets.
+// A hash that spreads neighbouring triangles, which are drawn at the same time, over the buckets.
 uint bucket_of(uint id) {
     return (id * 2654435761u >> 16) % CACHE_BUCKETS;
 }
@@ -47,7 +48,7 @@ uint look_up(uint bucket, uint id) {
             memoryBarrierBuffer();
             uint place = cache_entries[i].y;
             memoryBarrierBuffer();
-            // Still the same entry: the place is its own.
+            // The entry has not changed in between, so the place belongs to this ID.
             if (cache_entries[i].x == id + 1u) {
                 return place;
             }
@@ -105,11 +106,11 @@ uint memoized(uint id) {
             return place;
         }
         if (atomicCompSwap(cache_locks[bucket], 0u, 1u) == 0u) {
-            // Another may have stored it between look-up and lock.
+            // Another fragment may have stored the triangle between the look-up and taking the lock.
             place = look_up(bucket, id);
             if (place == NOT_CACHED) {
                 place = store_triangle(id);
-                // The older entry goes: the first is moved into the second.
+                // Replaces the older entry: the first entry moves into the second.
                 uvec2 older = cache_entries[bucket * 2u];
                 cache_entries[bucket * 2u + 1u].x = NO_ID;
                 memoryBarrierBuffer();
@@ -130,7 +131,7 @@ uint memoized(uint id) {
     return store_triangle(id);
 }
 
-// What tells the fragment's triangle from others.
+// The number that identifies the fragment's triangle.
 uint fragment_triangle() {
 #ifdef WHOLE_TRIANGLE
     return uint(gl_PrimitiveID);

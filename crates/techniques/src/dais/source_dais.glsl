@@ -20,7 +20,7 @@ void source_begin(ivec2 pixel) {
     source_background = 0u;
 }
 
-// The next triangle of the pixel, by a name that tells it from others, and its samples.
+// Finds the next triangle of the pixel, as the number that identifies it, and its samples.
 bool source_next_triangle(out uint name, out uint weight) {
     weight = 0u;
     name = NO_TRIANGLE;
@@ -28,7 +28,7 @@ bool source_next_triangle(out uint name, out uint weight) {
 #ifdef REFERENCES
         uint first = 1u << uint(findLSB(source_mask));
         name = sample_triangle(source_pixel, uint(findLSB(source_mask)));
-        // Of what the triangle covers, what no triangle before has had.
+        // Of the samples that the triangle covers, those that no earlier triangle has taken.
         uint same = name == NO_TRIANGLE ? first : (name >> 24 | first) & source_mask;
         source_mask &= ~same;
 #else

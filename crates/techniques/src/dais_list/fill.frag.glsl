@@ -60,7 +60,7 @@ uint triangle_reference() {
 }
 
 void add_entry(uint pixel, uint entry) {
-    // What is alone in its pixel stands in the head.
+    // A triangle that is alone in its pixel is stored in the head itself.
     if (atomicCompSwap(heads[pixel], 0u, entry) == 0u) {
         return;
     }

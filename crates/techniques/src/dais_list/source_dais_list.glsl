@@ -20,7 +20,7 @@ layout(set = 0, binding = 26, scalar) readonly buffer SampleDrops {
 layout(constant_id = 15) const uint BOUNDED = 0u;
 
 ivec2 source_pixel;
-uint source_link;           // the list's rest, as a head
+uint source_link;           // the rest of the list, in the format of a head
 uint source_sum;
 uint source_background;     // samples without a surface
 
@@ -35,7 +35,7 @@ void source_begin(ivec2 pixel) {
     source_background = 0u;
 }
 
-// Samples that were dropped for want of nodes are not the background.
+// Samples that were dropped because no node was left must not count as background.
 uint dropped_samples(uint pixel) {
     return BOUNDED != 0u ? sample_drops[pixel / 4u] >> pixel % 4u * 8u & 0xffu : 0u;
 }

@@ -23,7 +23,7 @@ void source_begin(ivec2 pixel) {
     source_background = 0u;
 }
 
-// Searches the next sample that no triangle before has shaded; all of a group search first and shade then.
+// Searches the next sample that is not shaded yet. The search comes before shading so that the threads of a group do both together.
 bool source_next(out Surface s, out uint weight) {
     weight = 0u;
     uint first = 0u;

@@ -63,7 +63,7 @@ Visible center_triangle() {
             most = v;
         }
     }
-    // A triangle may pass the centre by and yet own every sample.
+    // A triangle may miss the pixel's centre and still show in every sample.
     return nearest.id != NO_TRIANGLE || background ? nearest : most;
 }
 
@@ -106,7 +106,7 @@ void main() {
     pixel = ivec2(gl_GlobalInvocationID.xy);
     bool inside = all(lessThan(gl_GlobalInvocationID.xy, frame.size_px));
 
-    // What is to be stored: triangles, and samples of those that are not.
+    // The triangles to store, and the samples of those that are not stored.
     uint stored = 0u, covered = 0u, stored_samples = 0u;
     bool single = false;
     if (inside) {
@@ -142,7 +142,7 @@ void main() {
     uint block = pixel_block(pixel);
     uint dynamic = frame.size_px.x * frame.size_px.y + place;
     uint mask = all_samples();
-    uint weight_of_first = uint(bitCount(covered & ~stored_samples));  // what is not stored shows as the first block
+    uint weight_of_first = uint(bitCount(covered & ~stored_samples));  // samples of triangles that are not stored count for the first block
     Visible current;
     if (single || overflow) {
         current = center_triangle();

@@ -32,7 +32,7 @@ void main() {
     bool single = single_pixel || FILTERS != 0u && single_sample_surface(draw_material.x, distance_m);
     Coverage own = Coverage(uint(bitCount(mask)), uint(findLSB(mask)));
     if (own.index == 0u) {
-        // Where other surfaces of the pixel may be stored, a filtered one weighs what it covers.
+        // Other surfaces of the pixel may be stored too, so a filtered surface weighs only the samples that it covers.
         own.count = single_pixel ? SAMPLES : own.count;
         store_block(head, s, distance_m, own);
     } else if (!single) {

@@ -1,4 +1,4 @@
-// Which pixels and surfaces keep one sample alone (Fridvalszky and Toth 2020, section 5).
+// Which pixels and surfaces keep only one sample (Fridvalszky and Toth 2020, section 5).
 #ifndef AFTERLIGHT_FILTER
 #define AFTERLIGHT_FILTER
 #include "surfaces/visible/samples.glsl"

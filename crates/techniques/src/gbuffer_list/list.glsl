@@ -9,11 +9,11 @@
 //   word 5, 6  pointer: 26 bits index of the next block, 0 at the end (block 0 is no dynamic one); 3 bits of samples that it
 //              covers, less one; 3 bits with one of them
 //
-// Departure: the normal gives bits to what the pixel's own block covers, which no pointer tells. Options lengthen blocks: a
+// Departure: some of the normal's bits hold the coverage of the pixel's own block, because no pointer leads to that block. Options lengthen blocks: a
 // wide pointer (32 bits of index; a second word: samples covered, and one of them), the view distance at the pixel's centre
 // (else positions come from the depth buffer at the sample), emission (R9G9B9E5) in scenes that have any.
 //
-// All zeros: no block. The buffer is cleared before the lists are built.
+// A block of all zeros is empty. The buffer is cleared before the lists are built.
 #ifndef AFTERLIGHT_LIST
 #define AFTERLIGHT_LIST
 #include "packing.glsl"
@@ -84,7 +84,7 @@ vec3 unpack_block_normal(uint word) {
     return octahedral_decode(oct * 2.0 - 1.0);
 }
 
-// What the normal's word of a narrow block says that it covers.
+// The coverage that is stored in the normal's word of a block with narrow pointers.
 Coverage unpack_normal_coverage(uint word) {
     if (NORMAL_FILLS_WORD) {
         return Coverage(1u, 0u);

@@ -15,7 +15,7 @@ bool source_ended;
 uint source_sum;            // weights so far
 uint source_background;     // samples without a surface
 
-// What a block says of itself; with narrow pointers only the pixel's own block has to.
+// The coverage that a block itself stores; with narrow pointers only the pixel's own block does.
 Coverage own_coverage(uint block, uint normal) {
     if (POINTER_WORDS == 2u) {
         uint bits = blocks[pointer_word(block) + 1u];
@@ -43,14 +43,14 @@ void source_begin(ivec2 pixel) {
     uint normal = blocks[normal_word(source_block)];
     source_coverage = own_coverage(source_block, normal);
     if (normal == 0u) {
-        // No surface holds the pixel's own block; others may be linked all the same.
+        // The pixel's own block is empty; dynamic blocks may be linked from it all the same.
         follow_pointer(source_block);
     }
 }
 
 bool source_next(out Surface s, out uint weight) {
     if (source_ended) {
-        // A sum of all samples leaves no room for the background: the depth buffer is read at edges alone.
+        // If the weights already sum to all samples there is no background, so the depth buffer is read only at edges.
         source_background = source_sum < SAMPLES ? samples_without_surface(source_pixel) : 0u;
         return false;
     }

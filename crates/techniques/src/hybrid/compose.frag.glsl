@@ -10,7 +10,7 @@ layout(location = 0) out vec4 radiance_out;
 
 void main() {
     vec4 base = texelFetch(gbuffer_base_color, ivec2(gl_FragCoord.xy), 0);
-    // Colours are all that the sums have not. Where no light is taken, they are black.
+    // The sums lack nothing but the surface's colours. Surfaces that take no light have black ones.
     Surface s;
     s.position_ws = vec3(0.0);
     s.normal_ws = vec3(0.0, 0.0, 1.0);

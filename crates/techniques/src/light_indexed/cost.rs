@@ -2,7 +2,11 @@
 
 use afterlight_cost::{Cost, Workload};
 
-/// LiD, section 4.7, as the paper gives it for packed indices of one float a pixel; others change the memory alone.
+/// LiD, section 4.7, with `index_floats` floats of packed indices a pixel.
+///
+/// # Where it departs from the paper
+/// The paper's memory is `4p`, a G-buffer of three floats and one float of indices; here it is `(3 + index_floats)·p`, since the indices take two,
+/// four or six floats. The traffic is the paper's, whose numbering leaves pass 2 out.
 pub fn light_indexed(w: &Workload, index_floats: f64) -> Cost {
     Cost {
         cmd: w.objects * w.object_command + w.lights * w.light_command,

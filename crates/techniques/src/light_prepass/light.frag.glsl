@@ -1,5 +1,5 @@
-// One light over the pixels of its volume, added to three sums that no colour of the surface enters (Petrescu et al. 2016,
-// section 4.5, second pass; the parts: lobes() of shading.glsl).
+// One light over the pixels of its volume, added to three sums that do not depend on the surface's colours (Petrescu et al. 2016,
+// section 4.5, second pass). The three factors are those of lobes() in shading.glsl.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "gbuffer_lobe.glsl"

@@ -1,4 +1,4 @@
-// Keeps of the nearest surface what a light's lobes need and no colour (Petrescu et al. 2016, section 4.5, first pass).
+// Stores of the nearest surface only what the BRDF's lobes need, normal and roughness (Petrescu et al. 2016, section 4.5, first pass).
 //
 // Out: 0 normal, world space, octahedral, RG16 unsigned normalised; 1 roughness, R8, 0 where the surface takes no light; or at
 // FIRST_OUTPUT and after it.
@@ -19,7 +19,7 @@ void main() {
 #ifdef ALPHA_MASK
     visible_base_color(m, p);
 #endif
-    // Its base colour is not needed, and what is not needed is not sampled.
+    // The base colour is not read, so the compiler removes its texture fetches.
     Surface s = surface_at(m, p, vec3(0.0));
     normal_oct = octahedral_encode(s.normal_ws) * 0.5 + 0.5;
     roughness = s.unlit ? 0.0 : max(s.roughness, MIN_ROUGHNESS);

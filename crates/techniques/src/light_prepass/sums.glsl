@@ -7,12 +7,12 @@ layout(set = 0, binding = 8) uniform texture2D diffuse_light;
 layout(set = 0, binding = 9) uniform texture2D specular_light;
 layout(set = 0, binding = 10) uniform texture2D grazing_light;
 
-// A sum beyond the largest 16-bit float is infinite; times a black f0 it would be no number.
+// A sum above the largest 16-bit float is infinite; multiplied by an f0 of 0 it would become NaN, so it is clamped.
 vec3 gathered(texture2D light) {
     return min(texelFetch(light, ivec2(gl_FragCoord.xy), 0).rgb, vec3(65504.0));
 }
 
-// What the colours of the pixel's surface make of it.
+// Applies the colours of the pixel's surface to the gathered light.
 vec3 gathered_radiance(Surface s) {
     return reflected(
         unshadowed_point(s), gathered(diffuse_light), gathered(specular_light), gathered(grazing_light));

@@ -2,7 +2,12 @@
 
 use afterlight_cost::{Cost, Workload};
 
-/// D++, section 4.11. The paper numbers two terms 3; the second is pass 4.
+/// D++, section 4.11.
+///
+/// # Where it departs from the paper
+/// The paper uses `t` in two senses: tiles of a frame (`t·tile_cmd`) and pixels of a tile (`lf/t`, `2p/t`). Here `tiles` is the first and
+/// `pixels_a_tile` the second, and `2p/t`, two floats a tile, is `2·tiles`; `ov/t` divides by the tiles of a frame. The paper numbers two terms 3;
+/// the second is pass 4.
 pub fn visibility_buffer(w: &Workload) -> Cost {
     let shared = w.light_fragments / w.pixels_a_tile * (1.0 - w.light_culling);
     let vertices_a_tile = if w.tiles > 0.0 { w.object_vertices / w.tiles } else { 0.0 };

@@ -22,7 +22,7 @@ layout(set = 0, binding = 10, rgba8) writeonly uniform image2D final_color;
 // Least contrast of a neighbourhood, as a share of its brightest luma: lower finds more edges, and blurs more texture. With
 // 0.25 the colonnade at 640x360 comes off worse than without a filter (FLIP 0.0601, 0.0599); with this better (0.0597).
 const float CONTRAST_RELATIVE = 0.333;
-// Least contrast in any case: what is darker shows no staircase.
+// Least absolute contrast: in darker places no staircase is visible.
 const float CONTRAST_ABSOLUTE = 0.0625;
 // Most that a detail smaller than a pixel shifts it, as a share of a pixel: 1 is softest, 0 leaves such details. The
 // original's 0.75 blurs texture: colonnade at 320x180, FLIP 0.0802 instead of 0.0785.

@@ -99,7 +99,7 @@ vec3 reconstruct(ivec2 pixel, vec2 at_px, Plane surface, float pixel_m) {
             sum += weight * vec4(texelFetch(hdr, other, 0).rgb, 1.0);
         }
     }
-    // Nothing around shows the surface: what the pixel itself shows.
+    // No pixel around shows the sample's surface: take the pixel's own radiance.
     return sum.a > 1e-6 ? sum.rgb / sum.a : texelFetch(hdr, pixel, 0).rgb;
 }
 

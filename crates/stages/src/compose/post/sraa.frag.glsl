@@ -12,7 +12,7 @@ void main() {
 #ifdef ALPHA_MASK
     visible_base_color(load_material(draw_material.y), surface_point());
 #endif
-    // The triangle's own plane: what its vertices' normals say is not where it lies.
+    // The normal of the triangle's own plane; interpolated vertex normals do not describe where the triangle lies.
     vec3 normal = cross(dFdx(position_ws), dFdy(position_ws));
     float square = dot(normal, normal);
     vec2 octahedral = square > 0.0 ? octahedral_encode(normal * inversesqrt(square)) : vec2(0.0);

@@ -1,4 +1,4 @@
-// A surface with alpha blending: forward shading, the blending is the pass's.
+// Forward shading of a surface with alpha blending; the pass's blend state does the blending.
 // Out: linear radiance, not multiplied by alpha; alpha. RGBA16F.
 //
 // Draws of every state come in one call, so that their order is that of the sorted list: the winding of mirrored draws and the

@@ -1,5 +1,6 @@
-// Boxes of one level of the tree over the lights, from those of the level below or the spheres of the lights. A group of 32 threads a
-// node, a thread a child: a thread a node took 22 to 30 us a level instead of 17 (NVIDIA H200, where nothing takes 14).
+// Boxes of one level of the tree over the lights, from those of the level below or the spheres of the lights. A group of 32 threads
+// makes a node, one thread for each child. One thread for each node took 22 to 30 us a level instead of 17 (NVIDIA H200, where an empty
+// pass takes 14).
 //
 // In: light_spheres. In and out: boxes, RGBA32F, two texels a node: least and greatest corner, world space.
 #version 460
@@ -14,7 +15,7 @@ const uint GROUPS_A_ROW = 32768u;    // light_bvh/mod.rs
 shared vec3 lows[TREE_WIDTH];
 shared vec3 highs[TREE_WIDTH];
 
-// Box of a child; nothing where there is none.
+// Box of a child; an empty box where there is no child.
 void load_child(uint child, out vec3 low, out vec3 high) {
     low = vec3(3.402823e38);
     high = vec3(-3.402823e38);

@@ -22,7 +22,7 @@ vec3 tree_radiance(ShadingPoint p) {
     }
     vec3 radiance = vec3(0.0);
     uint level = top, node = 0u;
-    // Past the end of a level no node is left on any.
+    // Once a node's number is past the end of its level, no node is left on any level.
     while (node < tree_count(level)) {
         if (light_box_holds(level, node, p.position_ws)) {
             if (level > 1u) {

@@ -30,8 +30,8 @@ layout(set = 0, binding = 12, scalar) buffer ListCount {
     uint entries_dropped;
 };
 
-const uint LEVELS_MAX = 7u;         // of any number of lights in 32 bits
-const uint KEPT_MAX = 1024u;        // lights of a list that are kept until it has room
+const uint LEVELS_MAX = 7u;         // enough levels for any number of lights that 32 bits can count
+const uint KEPT_MAX = 1024u;        // lights of a list that stay in shared memory until the list has its place
 
 shared uint group_bits;
 shared uint kept[KEPT_MAX];
@@ -45,7 +45,7 @@ uint lane() {
     return gl_SubgroupID * gl_SubgroupSize + gl_SubgroupInvocationID;
 }
 
-// A bit a thread. The whole group calls it.
+// Collects one bit from every thread of the group. All threads must call it.
 uint group_ballot(bool value) {
     uint bits = subgroupBallot(value).x;
     if (gl_NumSubgroups == 1u) {
@@ -73,7 +73,7 @@ bool touches_light(CellBounds b, uint place) {
            cell_touches_cone(b, apex, axis, cos_angle);
 }
 
-// Children of a node that touch the cell, a bit each; of a node of level 1 they are lights.
+// A bit for each child of a node that touches the cell. The children of a node of level 1 are lights.
 uint touching_children(CellBounds b, uint level, uint node) {
     uint child = node * TREE_WIDTH + lane();
     if (level == 1u) {
@@ -82,7 +82,8 @@ uint touching_children(CellBounds b, uint level, uint node) {
     return group_ballot(child < tree_count(level - 1u) && cell_touches_box(b, light_box(level - 1u, child)));
 }
 
-// Lights found of a cell. The first KEPT_MAX stay in shared memory; where the list has its place, all are written to it.
+// Collects the lights of a cell. On the first walk the first KEPT_MAX are kept in shared memory; once the list has its place, all are
+// written there.
 struct Found {
     uint count;
     bool placed;
@@ -129,12 +130,12 @@ void find_lights(CellBounds b, inout Found found) {
     }
 }
 
-// Room for a list: where it begins.
+// Takes room for a list and returns where the list begins.
 uint take_room(uint count) {
     uint first = atomicAdd(entries_needed, count);
     uint room = first < list_capacity() ? min(count, list_capacity() - first) : 0u;
     if (room < count) {
-        // Marks a sum that has passed 2^32 and looks small.
+        // The sum has wrapped past 2^32 and would look small: mark that.
         atomicOr(entries_dropped, count - room);
     }
     return first;

@@ -1,5 +1,5 @@
-// Space of a cell, and which lights, and boxes of lights, touch it. Each test lets pass some that touch nothing, none misses one that
-// does.
+// The space that a cell takes, and which lights and boxes of lights touch it. The tests are conservative: they may pass a light that
+// touches nothing, but never miss one that touches the cell.
 //
 // CPU twin: crates/oracle/src/clusters.rs.
 #ifndef AFTERLIGHT_CLUSTER_BOUNDS
@@ -55,7 +55,7 @@ CellBounds cell_bounds(Cell cell) {
     return b;
 }
 
-// Whether a half-space holds nothing of a box.
+// Whether a box lies completely outside of a half-space.
 bool is_outside(vec4 plane, vec3 centre, vec3 half_size) {
     return dot(plane, vec4(centre, 1.0)) + dot(abs(plane.xyz), half_size) < 0.0;
 }
@@ -70,7 +70,7 @@ bool cell_touches_box(CellBounds b, LightBox box) {
            !is_outside(b.top, centre, half_size) && !is_outside(b.bottom, centre, half_size);
 }
 
-// Whether one of the cell's steps that hold a surface lies within view distances.
+// Whether any step of the cell that holds a surface lies between two view distances.
 bool touches_steps(CellBounds b, float nearest_m, float farthest_m) {
     if (DIVISION != TILES_25D) {
         return true;
@@ -79,8 +79,8 @@ bool touches_steps(CellBounds b, float nearest_m, float farthest_m) {
     return (b.steps & (0xffffffffu << first) & (0xffffffffu >> (31u - last))) != 0u;
 }
 
-// A sphere passes where it touches the box along the camera's axes and no side plane of the frustum has it outside: each lets pass
-// some that the other does not, at the corners.
+// A sphere passes if it touches the box along the camera's axes and lies outside of no side plane of the frustum. At corners each of
+// the two tests rejects spheres that the other would pass.
 bool cell_touches_sphere(CellBounds b, vec4 sphere) {
     vec4 centre = vec4(sphere.xyz, 1.0);
     float range_m = sphere.w;
@@ -91,7 +91,7 @@ bool cell_touches_sphere(CellBounds b, vec4 sphere) {
            touches_steps(b, at.z - range_m, at.z + range_m);
 }
 
-// A cone without an end passes where it comes within the radius of the sphere around the cell; one wider than a half-space always.
+// An endless cone passes if it comes within the radius of the sphere around the cell. A cone wider than a half-space always passes.
 bool cell_touches_cone(CellBounds b, vec3 apex, vec3 axis, float cos_angle) {
     if (cos_angle <= 0.0) {
         return true;
@@ -100,7 +100,7 @@ bool cell_touches_cone(CellBounds b, vec3 apex, vec3 axis, float cos_angle) {
     float along_m = dot(to_cell, axis);
     float aside_m = sqrt(max(dot(to_cell, to_cell) - along_m * along_m, 0.0));
     float sin_angle = sqrt(max(1.0 - cos_angle * cos_angle, 0.0));
-    // Distance from the cone's side where its nearest point is on it and not the apex.
+    // Distance to the cone's side; valid where the nearest point of the cone lies on its side and is not its apex.
     bool beside_apex = along_m * cos_angle + aside_m * sin_angle < 0.0;
     float outside_m = beside_apex ? length(to_cell) : aside_m * cos_angle - along_m * sin_angle;
     return outside_m <= b.sphere.w;

@@ -21,7 +21,7 @@ layout(set = 0, binding = 35, scalar) readonly buffer CellLists {
     uint cell_lists[];
 };
 
-// Finds the cell of a surface; false where none was found to hold it, or there was no room for the cell.
+// Finds the cell of a surface. False if no cell was made for its place, or there was no room for that cell.
 bool cell_of(uvec2 pixel, float distance_m, out uint place) {
     uint tile = tile_of(pixel);
     if (DIVISION != CLUSTERS) {
@@ -53,8 +53,8 @@ vec3 cell_color(uvec2 pixel, float distance_m) {
     return vec3(bits & 255u, bits >> 8 & 255u, bits >> 16 & 255u) / 320.0;
 }
 
-// Radiance of the lights with an end that reach a surface of a pixel at a view distance. A surface that no cell was made for, since
-// it is shaded off the samples that show it, asks the tree over the lights.
+// Radiance of the lights with an end that reach a surface of a pixel at a view distance. A surface may be
+// shaded at a place where no sample shows it; if no cell was made there, it asks the tree over the lights.
 vec3 cell_radiance(ShadingPoint p, uvec2 pixel, float distance_m) {
     uint place;
     if (!cell_of(pixel, distance_m, place)) {

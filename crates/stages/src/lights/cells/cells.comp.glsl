@@ -19,7 +19,8 @@ layout(set = 0, binding = 50, scalar) buffer CellCount {
     uint cells_dropped;
 };
 
-// Capacities are lengths of buffers and no constants: a frame that is recorded again with room keeps its pipelines.
+// Capacities are read from the buffers' lengths and are not specialization constants: a frame that is recorded again with more room keeps
+// its pipelines.
 uint cell_capacity() {
     return uint(cells.length());
 }
@@ -32,7 +33,7 @@ shared uint tile_farthest;
 
 void mark(uint bit) {
     uint word = bit >> 5, mask = 1u << (bit & 31u);
-    // A stale word costs an atomic, never a bit.
+    // If this plain read is out of date, an atomic is done that was not needed; no bit is ever lost.
     if ((tile_bits[word] & mask) == 0u) {
         atomicOr(tile_bits[word], mask);
     }
@@ -47,7 +48,7 @@ void include_distance(float distance_m) {
     }
 }
 
-// View distances between which the tile's surfaces lie, with room for rounding.
+// View distances between which the tile's surfaces lie, widened a little for rounding.
 vec2 tile_range_m() {
     return vec2(uintBitsToFloat(tile_nearest) * (1.0 - DISTANCE_SLACK),
                 uintBitsToFloat(tile_farthest) * (1.0 + DISTANCE_SLACK));
@@ -58,7 +59,7 @@ void mark_step(float distance_m) {
     mark(step_of(distance_m, range_m.x, range_m.y));
 }
 
-bool by_step;   // what visit_surfaces does
+bool by_step;   // whether visit_surfaces marks steps (else it finds the range of distances)
 
 void visit_distance(float distance_m) {
     if (by_step) {
@@ -87,7 +88,7 @@ Cell cluster_cell(uint tile, uint slice) {
                 slice_begin_m(slice + 1u) * (1.0 + DISTANCE_SLACK), 0xffffffffu);
 }
 
-// Cells of the tile before each of its words, and where they stand among all.
+// Number of the tile's cells before each of its words, and the place of the tile's first cell among all cells.
 void place_cells(uint tile) {
     uint count = 0u;
     for (uint w = 0u; w < WORDS; ++w) {

@@ -23,7 +23,7 @@ layout(constant_id = 43) const uint LOGARITHMIC = 1u;
 
 const uint WORDS = DIVISION == CLUSTERS ? (SLICES + 31u) / 32u : 1u;
 
-// Share of a view distance that rounding may move it by: ends of cells are farther out by it.
+// Relative error that rounding may cause in a view distance. Ends of cells are moved outwards by it.
 const float DISTANCE_SLACK = 2e-4;
 
 // A cell that holds a surface.
@@ -43,7 +43,8 @@ uint tile_of(uvec2 pixel) {
     return tile.y * tiles_across() + tile.x;
 }
 
-// The slice of a view distance: equal ratios, or equal steps. What lies outside of all is in the first or the last.
+// The slice that a view distance lies in; slices have equal ratios or equal steps. Distances outside of all slices belong to the first or
+// the last.
 uint slice_of(float distance_m) {
     float nearest_m = frame.distance_range_m.x, farthest_m = frame.distance_range_m.y;
     float share = LOGARITHMIC != 0u ? log2(distance_m / nearest_m) / log2(farthest_m / nearest_m)

@@ -7,7 +7,7 @@
 layout(set = 0, binding = 14) uniform texture2D light_parts_0;
 layout(set = 0, binding = 15) uniform texture2D light_parts_1;
 layout(set = 0, binding = 16) uniform texture2D light_parts_2;
-// Images of four parts in use: 1, 2 or 3.
+// Number of images in use, 1, 2 or 3; each holds four parts.
 layout(constant_id = 14) const uint PART_IMAGES = 1u;
 
 // Numbers of lights, counted from one among those with an end, the nearest first; 0: none.

@@ -11,7 +11,7 @@
 
 const uint PART_VALUES = 3u;
 
-// The next four parts of a code, which are taken off it.
+// Takes the next four parts off a code.
 vec4 take_parts(inout uint code) {
     vec4 parts;
     for (int channel = 0; channel < 4; ++channel) {

@@ -1,9 +1,9 @@
 // Appends a light to the lists of the pixels whose surfaces lie within its range (Petrescu et al. 2016, section 4.7, Figure 4).
 //
-// Drawn by the back faces of volumes: a pixel meets one of them a light. A pixel's surfaces lie between two points of the ray through its
-// centre: the light is told by its distance to what is between them.
-// In and out: LightHeads. Out: LightNodes, LightNodeCount. With ONE_DEPTH the surface is that of light_lists_depth: a buffer that is
-// written as well is read slowly (23.5 ms instead of 16, NVIDIA H200, Sponza, 10,000 lights).
+// Drawn by the back faces of light volumes, so that a pixel meets each light once. A pixel's surfaces lie between two points of the ray
+// through its centre; the light is appended if that part of the ray comes within its range.
+// In and out: LightHeads. Out: LightNodes, LightNodeCount. With ONE_DEPTH the surface is taken from light_lists_depth, because reading a
+// buffer that the same pass writes is slow (23.5 ms instead of 16, NVIDIA H200, Sponza, 10,000 lights).
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "culling.glsl"
@@ -28,7 +28,8 @@ layout(constant_id = 15) const uint SAMPLED = 0u;
 layout(set = 0, binding = 8) uniform texture2D light_lists_depth;
 #endif
 
-// The count stays here, above every capacity and below its end by more threads than run at once: it does not begin anew.
+// The counter is held at this value once it is full: above every capacity, and so far below 2^32 that the threads that run at once cannot
+// make it wrap around.
 const uint MOST_NEEDED = 0xf0000000u;
 
 layout(location = 0) flat in uint light_index;
@@ -46,7 +47,7 @@ bool is_within_range(uint pixel) {
     return depth > 0.0 && reaches_point(light_sphere(light_index), position_from_depth(ndc, depth), 0.0);
 }
 #else
-// Surfaces at the samples lie near the ray through the pixel's centre, by at most half its width at the farther end.
+// Surfaces at the samples lie off the ray through the pixel's centre, by at most half a pixel's width at the farther end.
 bool reaches_ray(vec4 sphere, vec2 ndc, float nearest_m, float farthest_m) {
     float farthest_depth = depth_from_distance(farthest_m);
     vec3 far = position_from_depth(ndc, farthest_depth);
@@ -66,7 +67,7 @@ bool is_within_range(uint pixel) {
     if (SAMPLED != 0u) {
         return reaches_ray(sphere, ndc, nearest_m, farthest_m);
     }
-    // One surface is a point: between the ends of its head is room for rounding alone.
+    // A single surface is a point: the two ends in the head differ by rounding only.
     vec3 point = position_from_depth(ndc, depth_from_distance(0.5 * (nearest_m + farthest_m)));
     return reaches_point(sphere, point, farthest_m - nearest_m);
 }

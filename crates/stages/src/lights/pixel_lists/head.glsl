@@ -1,4 +1,4 @@
-// What a pixel holds of its list of lights.
+// The head of a pixel's list of lights.
 #ifndef AFTERLIGHT_LIGHT_HEAD
 #define AFTERLIGHT_LIGHT_HEAD
 

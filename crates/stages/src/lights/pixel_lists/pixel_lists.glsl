@@ -14,12 +14,12 @@ layout(set = 0, binding = 38, scalar) readonly buffer LightNodes {
     uvec2 light_nodes[];
 };
 
-// 1 where surfaces may be shaded off the samples that the list was made for; else the tree's code is gone, whose registers cost more
-// than what it is for (light-list-forward: 21.7 ms instead of 6.5, NVIDIA H200, Sponza, 10,000 lights).
+// 1 where surfaces may be shaded at places that the list was not made for. Otherwise the compiler removes the code that walks the tree,
+// because its registers slow down the whole shader (light-list-forward: 21.7 ms instead of 6.5, NVIDIA H200, Sponza, 10,000 lights).
 layout(constant_id = 47) const uint LISTS_SAMPLED = 1u;
 
-// Radiance of the lights with an end that reach a surface of a pixel at a view distance. One that the list does not hold for asks the
-// tree over the lights.
+// Radiance of the lights with an end that reach a surface of a pixel at a view distance. A surface outside of the range
+// that the list was made for asks the tree over the lights.
 vec3 listed_radiance(ShadingPoint p, uvec2 pixel, float distance_m) {
     LightHead head = light_heads[pixel.y * frame.size_px.x + pixel.x];
     if (LISTS_SAMPLED != 0u && (distance_m < head.nearest_m || distance_m > head.farthest_m)) {

@@ -1,4 +1,4 @@
-// Which lights a surface visits, whatever holds the surface: one code for every technique that shades a surface at once.
+// Chooses the lights that a surface visits. Every technique that shades a surface in one go uses this code, however the surface is stored.
 #ifndef AFTERLIGHT_LIGHT_STEP
 #define AFTERLIGHT_LIGHT_STEP
 #include "lights/cells/cell_lists.glsl"
@@ -12,7 +12,7 @@ const uint STEP_LISTS = 3u;     // those on the list of its pixel
 const uint STEP_NONE = 4u;      // none: other passes add them
 layout(constant_id = 46) const uint LIGHT_STEP = STEP_ALL;
 
-// Radiance of the lights, for a surface of a pixel at a view distance.
+// Radiance from the lights at a surface of a pixel; `distance_m` is its view distance.
 vec3 lights_radiance(ShadingPoint p, uvec2 pixel, float distance_m) {
     if (LIGHT_PAIRS == CELL_COLORS) {
         return cell_color(pixel, distance_m);
@@ -37,7 +37,7 @@ vec3 lights_radiance(ShadingPoint p, uvec2 pixel, float distance_m) {
     return radiance;
 }
 
-// Radiance that leaves a surface of a pixel: surface_radiance, by the lights that it visits.
+// Radiance that leaves a surface of a pixel: as surface_radiance, but only over the lights that the step finds for it.
 vec3 stepped_radiance(Surface s, uvec2 pixel) {
     vec3 radiance = unlit_radiance(s);
     if (!s.unlit) {

@@ -18,16 +18,16 @@ pub const SAMPLES: usize = 64;
 pub const RADIUS: f32 = 0.3;
 
 /// What indirect light is gathered from, as the graph knows it.
-pub struct Rsm {
-    pub constants: BufferHandle,
+struct Rsm {
+    constants: BufferHandle,
     /// None where there is no indirect light.
-    pub images: Option<RsmImages>,
+    images: Option<RsmImages>,
 }
 
 /// The light's view.
-pub struct RsmImages {
-    pub surface: ImageHandle,
-    pub flux: ImageHandle,
+struct RsmImages {
+    surface: ImageHandle,
+    flux: ImageHandle,
 }
 
 /// Says that surfaces of this frame gather indirect light.

@@ -23,10 +23,10 @@ pub const FILTER_REACH_TEXELS: f32 = 1.5;
 const NEARER_TEXELS: f32 = 0.5;
 
 /// What tells whether a light reaches a point, as the graph knows it.
-pub struct Shadow {
-    pub constants: BufferHandle,
+struct Shadow {
+    constants: BufferHandle,
     /// None where there are no shadows.
-    pub map: Option<ImageHandle>,
+    map: Option<ImageHandle>,
 }
 
 impl SceneInput for Shadow {

@@ -8,7 +8,7 @@ layout(set = 0, binding = 9, scalar) readonly buffer DrawCommands {
     uint draw_commands[];
 };
 
-// A triangle's place in the order of draws, as good as its ID to tell triangles apart; NO_TRIANGLE where there is none.
+// A triangle's place in the order of draws, which tells triangles apart as well as an ID does; NO_TRIANGLE where there is none.
 uint sample_order(ivec2 pixel, uint i) {
     return ~sample_keys[sample_word(pixel, i)];
 }

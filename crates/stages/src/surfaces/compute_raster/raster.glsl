@@ -12,7 +12,7 @@
 #include "triangle.glsl"
 #include "surfaces/visible/samples.glsl"
 
-// One a sample, those of a pixel side by side.
+// One key for each sample; the keys of a pixel are neighbours.
 layout(set = 0, binding = 8, scalar) buffer SampleKeys {
     uint64_t sample_keys[];
 };
@@ -22,7 +22,7 @@ layout(set = 0, binding = 9, scalar) readonly buffer DrawCommands {
 };
 
 const int SUBPIXELS = 256;
-// Beyond this many pixels snapped coordinates are clamped: products of their differences stay within 64 bits.
+// Snapped coordinates are clamped to this many pixels, so that products of their differences fit into 64 bits.
 const float GUARD_BAND_PX = 2.0e6;
 
 // A triangle on the screen, its front towards the viewer, vertices so ordered that the inside is at positive edge functions.
@@ -67,7 +67,7 @@ bool screen_triangle(RasterDraw d, vec4 c0, vec4 c1, vec4 c2, uint part, out Scr
         return false;
     }
     if (outside != 0u) {
-        // Turned so that the one vertex unlike the others is the first.
+        // Rotated so that the vertex that lies on the other side of the plane than the two others comes first.
         uint odd = bitCount(outside) == 1u ? outside : 7u - outside;
         if (odd == 2u) {
             vec4 c = c0;
@@ -169,7 +169,7 @@ bool passes_alpha(RasterDraw d, uint triangle, ivec2 pixel) {
 #endif
 }
 
-// Keeps the nearest surface of the samples that a mask names. `order` is the triangle's place in the order of draws.
+// Writes the triangle's key to every sample of the mask where it is the nearest so far. `order` is the triangle's place in the order of draws.
 void keep_nearest(ivec2 pixel, uint covered, ScreenTriangle t, DepthPlane plane, uint order, RasterDraw d) {
     vec2 corner = vec2(pixel) - vec2(t.p0) / float(SUBPIXELS);
     uint wins = 0u;
@@ -177,7 +177,7 @@ void keep_nearest(ivec2 pixel, uint covered, ScreenTriangle t, DepthPlane plane,
         if ((covered >> i & 1u) != 0u) {
             float depth = depth_at(plane, corner + sample_location(i));
             uint64_t key = packUint2x32(uvec2(~order, floatBitsToUint(depth)));
-            // A stale key is a smaller one: it costs an atomic, never a sample.
+            // If this plain read is out of date, the key was smaller: an atomic is done that was not needed, and no sample is lost.
             wins |= depth > 0.0 && key > sample_keys[key_index(pixel, i)] ? 1u << i : 0u;
         }
     }

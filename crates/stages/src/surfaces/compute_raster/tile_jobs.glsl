@@ -2,7 +2,7 @@
 #ifndef AFTERLIGHT_TILE_JOBS
 #define AFTERLIGHT_TILE_JOBS
 
-// 64 threads take sixteen pixels each. Smaller tiles are more jobs, larger ones leave threads idle at edges.
+// Each of 64 threads takes sixteen pixels. Smaller tiles would make more jobs, larger ones would leave threads idle at a triangle's edges.
 const int TILE_PX = 32;
 
 // An edge function over the image, 64 bits: exact for any triangle within the guard band.
@@ -20,7 +20,7 @@ int64_t edge_at(Edge e, ivec2 subpixel) {
     return e.at_origin + int64_t(e.d.x) * int64_t(subpixel.y) - int64_t(e.d.y) * int64_t(subpixel.x);
 }
 
-// False where a box of size_px pixels lies outside of an edge as a whole.
+// False if a box of size_px pixels lies completely outside of an edge.
 bool edge_may_touch(Edge e, ivec2 pixel, int size_px) {
     int64_t gain = int64_t(size_px * SUBPIXELS) * int64_t(max(e.d.x, 0) + max(-e.d.y, 0));
     return edge_at(e, pixel * SUBPIXELS) + gain >= 0L;

@@ -24,8 +24,8 @@ layout(push_constant, scalar) uniform Push {
     uint first_draw;        // of those in view
 };
 
-// Side of the box of a small triangle, pixels: longer loops of one thread cost more than a group's turn at the triangle.
-// 32-bit edge functions hold up to 64 pixels.
+// Largest side of a small triangle's bounding box, pixels. For larger ones a loop in a single thread costs more than handing the triangle
+// to a group. 32-bit edge functions are exact up to 64 pixels.
 layout(constant_id = 11) const uint SMALL_PX = 16u;
 
 void rasterize_small(ScreenTriangle t, ivec2 first, ivec2 last, uint order, RasterDraw d) {
@@ -37,7 +37,7 @@ void rasterize_small(ScreenTriangle t, ivec2 first, ivec2 last, uint order, Rast
             ivec2 corner = ivec2(x, y) * SUBPIXELS;
             ivec2 q0 = corner - t.p0, q1 = corner - t.p1, q2 = corner - t.p2;
             ivec3 edge = bias + ivec3(d0.x * q0.y - d0.y * q0.x, d1.x * q1.y - d1.y * q1.x, d2.x * q2.y - d2.y * q2.x);
-            // Most that each grows within the pixel.
+            // The most that each edge function grows within a pixel.
             ivec3 gain = SUBPIXELS * (max(ivec3(d0.x, d1.x, d2.x), 0) + max(-ivec3(d0.y, d1.y, d2.y), 0));
             if (any(lessThan(edge + gain, ivec3(0)))) {
                 continue;

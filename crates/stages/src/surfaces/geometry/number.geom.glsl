@@ -48,7 +48,7 @@ void main() {
         uv0_uv1 = in_uv0_uv1[i];
         color = in_color[i];
 #ifdef WHOLE_TRIANGLE
-        // What is flat comes from the first vertex.
+        // Flat outputs are taken from the first vertex.
         if (i == 0) {
             vertex_normals = normals;
             for (int k = 0; k < 3; ++k) {

@@ -2,7 +2,7 @@
 //
 // In: three vertices of surface.vert.glsl#tessellation, world space. Out: the same, and the segments of each edge.
 // An edge's segments are a function of its two ends alone, symmetric in them and `precise`: both triangles at an edge find
-// the same number, and no crack opens. Patches that nothing can be seen of get no segments and end here.
+// the same number, and no crack opens. Patches that cannot be seen get no segments and are discarded here.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "frame.glsl"
@@ -27,7 +27,7 @@ layout(location = 3) out vec3 patch_position_ws[3];
 layout(location = 4) out vec3 patch_normal_ws[3];
 layout(location = 5) out vec4 patch_tangent_ws[3];
 
-const float MAX_SEGMENTS = 64.0;    // what every device with tessellation takes
+const float MAX_SEGMENTS = 64.0;    // supported by every device that has tessellation
 
 float row_dot(vec4 row, vec3 p) {
     precise float sum = row.x * p.x + row.y * p.y + row.z * p.z + row.w;

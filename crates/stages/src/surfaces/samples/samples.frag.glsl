@@ -9,7 +9,7 @@
 #include "shading.glsl"
 #include "surface_in.glsl"
 
-// Interpolated within the part of the pixel that the triangle covers: off the centre where that is not the whole pixel.
+// Interpolated inside of the part of the pixel that the triangle covers. Where that is not the whole pixel, it differs from the centre.
 layout(location = 6) centroid in vec3 centroid_position_ws;
 
 layout(location = 0) out vec4 base_color_metallic;
@@ -24,7 +24,7 @@ void main() {
     base_color_metallic = vec4(s.base_color, s.metallic);
     normal_oct = octahedral_encode(s.normal_ws) * 0.5 + 0.5;
     float roughness = s.unlit ? 0.0 : max(s.roughness, MIN_ROUGHNESS);
-    // Off the centre by more than the rounding of two interpolations: a hundredth of a pixel.
+    // The two positions differ by more than a hundredth of a pixel, which is more than rounding of the two interpolations explains.
     vec3 off = abs(centroid_position_ws - position_ws), pixel = fwidth(position_ws);
     float edge = off.x + off.y + off.z > 0.01 * (pixel.x + pixel.y + pixel.z) ? 1.0 : 0.0;
     roughness_occlusion_edge = vec4(roughness, s.occlusion, edge, 0.0);

@@ -1,5 +1,5 @@
-// Shade and resolve, one thread a pixel: every surface that the source holds once, by the lights that it visits (light_step/);
-// LOW_RATE: with irradiance that pixels share.
+// Shades and resolves one pixel in each thread: every surface of the source once, by the lights that light_step/ finds for it. With
+// LOW_RATE neighbouring pixels share the irradiance of indirect light.
 //
 // In: the source's images or buffers, gbuffer_depth. Out: hdr, RGBA16F, radiance. Dispatch: 8x8 groups.
 #version 460

@@ -23,6 +23,7 @@ const GROUP_TRIANGLES: u32 = 128;
 
 /// Records of triangles.
 pub struct Records {
+    /// The records, 80 bytes each.
     pub words: BufferHandle,
     /// Triangle ID of each record, for the views that ask for it.
     pub ids: Option<BufferHandle>,

@@ -6,12 +6,12 @@
 #ifdef SAMPLES_IN_KEYS
 #include "surfaces/compute_raster/key_ids.glsl"
 
-// A name that tells the sample's triangle from others; NO_TRIANGLE where there is none.
+// A number that identifies the sample's triangle among those of the pixel; NO_TRIANGLE where the sample shows none.
 uint sample_triangle(ivec2 pixel, uint i) {
     return sample_order(pixel, i);
 }
 
-// The triangle ID of a name.
+// The triangle ID that belongs to such a number.
 uint triangle_id(uint name) {
     return triangle_id_from_order(name);
 }
@@ -37,7 +37,7 @@ struct Visible {
     uint samples;   // mask of the samples that show it
 };
 
-// Takes the first triangle out of a mask of samples, those without a surface as well.
+// Takes the samples of the first triangle out of a mask; samples without a surface are taken out in the same way.
 Visible take_triangle(ivec2 pixel, inout uint mask) {
     uint first = uint(findLSB(mask));
     Visible v = Visible(sample_triangle(pixel, first), 1u << first);
