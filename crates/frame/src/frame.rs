@@ -10,7 +10,7 @@ use crate::{
     Board, Params, Slots, TechniqueError,
     capacity::Capacities,
     scene::{BUCKETS, SceneGpu, lights::SceneLights},
-    views,
+    set_constants, views,
 };
 
 /// A frame to be recorded: the scene on the device, its buffers imported into the graph, sizes and parameters.
@@ -215,9 +215,7 @@ impl Frame<'_> {
     ) -> afterlight_graph::ComputePass<'g> {
         let mut pass = graph.compute(name, role, shader);
         self.bind_scene(&mut pass);
-        for (name, bits) in self.constants(&[shader]) {
-            pass.constant(&name, bits);
-        }
+        set_constants(&mut pass, self.constants(&[shader]));
         pass
     }
 

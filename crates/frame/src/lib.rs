@@ -39,7 +39,7 @@ pub use scene::{
     lights::{SceneLights, device_order},
 };
 pub use settings::Settings;
-pub use slots::{Slots, SourceSlots};
+pub use slots::{Slots, SourceSlots, set_constants};
 pub use technique::{
     ANY_SAMPLES, Answers, AppendixA, Exactness, Info, MULTIPLE_SAMPLES, Need, Source, Technique, completed,
     params_of, set_param,

@@ -101,6 +101,32 @@ pub struct Info {
     pub views: &'static [&'static str],
 }
 
+impl Info {
+    /// What most techniques have in common, for `..Info::USUAL` after what is a technique's own: one sample a pixel, tessellated surfaces,
+    /// no needs, no views.
+    pub const USUAL: Info = Info {
+        id: "",
+        title: "",
+        summary: "",
+        sources: &[],
+        answers: Answers { surface: "", lights: "", schedule: "", resolve: "" },
+        appendix_a: AppendixA {
+            id: "",
+            intersect: "",
+            transparency: "",
+            hardware_msaa: "",
+            light_access: "",
+            material_access: "",
+            rates_decoupled: "",
+        },
+        exactness: Exactness::Exact { min_psnr_db: 50.0 },
+        needs: &[],
+        samples: &[1],
+        tessellation: true,
+        views: &[],
+    };
+}
+
 /// Every sample count that a device may have.
 pub const ANY_SAMPLES: &[u32] = &[1, 2, 4, 8, 16];
 /// More than one sample.

@@ -45,8 +45,6 @@ pub mod geometry {
     pub use afterlight_frame::{MAX_DISPLACEMENT_MM, MAX_TESSELLATE_PX, MIN_TESSELLATE_PX};
 }
 
-mod forward_by_cells;
-
 include!(concat!(env!("OUT_DIR"), "/registry.rs"));
 include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
 

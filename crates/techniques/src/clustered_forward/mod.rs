@@ -4,9 +4,8 @@
 
 pub mod cost;
 
-use crate::forward_by_cells::ForwardByCells;
 use afterlight_frame::{ANY_SAMPLES, Answers, AppendixA, Exactness, Info, Source};
-use afterlight_stages::lights::cells::{ClusterParams, Division};
+use afterlight_stages::{lights::cells::{ClusterParams, Division}, surfaces::depth_first::ForwardByCells};
 
 /// The technique.
 pub static TECHNIQUE: ForwardByCells<ClusterParams> = ForwardByCells {
@@ -31,10 +30,8 @@ pub static TECHNIQUE: ForwardByCells<ClusterParams> = ForwardByCells {
             rates_decoupled: "n, n",
         },
         exactness: Exactness::Exact { min_psnr_db: 50.0 },
-        needs: &[],
         samples: ANY_SAMPLES,
-        tessellation: true,
-        views: &[],
+        ..Info::USUAL
     },
     division: Division::Clusters,
     cost: cost::clustered_forward,

@@ -20,7 +20,7 @@ use afterlight_frame::{
 };
 use afterlight_shader::Shader;
 use afterlight_stages::{
-    lights::{cells, step::LightMethod},
+    lights::{cells, step::{self, LightMethod}},
     surfaces::shade::SurfaceSource,
     surfaces::{
         compute_raster::{ComputeRasterParams, Visibility},
@@ -108,17 +108,16 @@ static INFO: Info = Info {
     ],
     answers: Answers {
         surface: "triangle IDs and a triangle buffer",
-        lights: "loop over all, tiles, clusters, or a tree",
+        lights: step::ANSWER,
         schedule: "compute, a thread a pixel",
         resolve: "once a triangle",
     },
     appendix_a: APPENDIX_A,
     // Texture gradients are analytic.
     exactness: Exactness::Exact { min_psnr_db: 45.0 },
-    needs: &[],
     samples: ANY_SAMPLES,
-    tessellation: true,
     views: views::TRIANGLES,
+    ..Info::USUAL
 };
 
 impl Technique for Dais {

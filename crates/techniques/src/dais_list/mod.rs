@@ -20,7 +20,7 @@ use afterlight_frame::{
 };
 use afterlight_shader::Shader;
 use afterlight_stages::{
-    lights::cells,
+    lights::{cells, step},
     surfaces::claims,
     surfaces::shade::SurfaceSource,
     surfaces::{claims::NOT_TAKEN, depth_first::FIRST_FRAGMENT, triangles},
@@ -46,7 +46,7 @@ static INFO: Info = Info {
     sources: &[Source { key: "schied-2015", section: "4.1" }],
     answers: Answers {
         surface: "per-pixel lists of triangle references, and a triangle buffer",
-        lights: "loop over all, tiles, clusters, or a tree",
+        lights: step::ANSWER,
         schedule: "compute, a thread a pixel",
         resolve: "once a triangle, weighted by coverage",
     },
@@ -54,8 +54,8 @@ static INFO: Info = Info {
     exactness: Exactness::Exact { min_psnr_db: 45.0 },
     needs: &[Need { name: "post-depth coverage", test: |features| features.post_depth_coverage }],
     samples: MULTIPLE_SAMPLES,
-    tessellation: true,
     views: views::TRIANGLES,
+    ..Info::USUAL
 };
 
 impl Technique for DaisList {

@@ -16,7 +16,7 @@ use afterlight_frame::{
 };
 use afterlight_graph::gpu;
 use afterlight_shader::Shader;
-use afterlight_stages::shared::indirect::IndirectLight;
+use afterlight_stages::{lights::step, shared::indirect::IndirectLight};
 
 /// The technique.
 pub static TECHNIQUE: DaisMultirate = DaisMultirate;
@@ -112,7 +112,7 @@ static INFO: Info = Info {
     ],
     answers: Answers {
         surface: "triangle IDs and a triangle buffer",
-        lights: "loop over all, tiles, clusters, or a tree",
+        lights: step::ANSWER,
         schedule: "compute, a thread a pixel; indirect light a few threads a triangle and cell of pixels",
         resolve: "once a triangle",
     },
@@ -121,10 +121,9 @@ static INFO: Info = Info {
         bound: "indirect light of a cell's pixels is that of their mean place; without --indirect as dais",
         min_psnr_db: 40.0,
     },
-    needs: &[],
     samples: &[1, 2, 4, 8],
-    tessellation: true,
     views: views::TRIANGLES,
+    ..Info::USUAL
 };
 
 impl Technique for DaisMultirate {

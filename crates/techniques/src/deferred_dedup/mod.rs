@@ -13,7 +13,7 @@ use afterlight_frame::{
 };
 use afterlight_shader::Shader;
 use afterlight_stages::{
-    lights::step::StepParams,
+    lights::step::{self, StepParams},
     surfaces::shade,
     surfaces::{
         geometry::SceneDraws,
@@ -36,7 +36,7 @@ static INFO: Info = Info {
     sources: &[Source { key: "schied-2015", section: "5" }],
     answers: Answers {
         surface: "G-buffer, MSAA with triangle IDs",
-        lights: "loop over all, tiles, clusters, or a tree",
+        lights: step::ANSWER,
         schedule: "compute, a thread a pixel",
         resolve: "once a triangle",
     },
@@ -52,8 +52,8 @@ static INFO: Info = Info {
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
     needs: &[samples::STANDARD_LOCATIONS],
     samples: MULTIPLE_SAMPLES,
-    tessellation: true,
     views: shade::VIEWS,
+    ..Info::USUAL
 };
 
 impl Technique for DeferredDedup {

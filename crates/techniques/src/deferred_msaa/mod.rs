@@ -16,7 +16,7 @@ use afterlight_frame::{
 };
 use afterlight_shader::Shader;
 use afterlight_stages::{
-    lights::step::{LightMethod, StepParams},
+    lights::step::{self, LightMethod, StepParams},
     surfaces::samples::{SampleBuffer, emission_variant},
     surfaces::shade,
     surfaces::{
@@ -41,7 +41,7 @@ static INFO: Info = Info {
     ],
     answers: Answers {
         surface: "G-buffer, multisampled",
-        lights: "loop over all, tiles, clusters, or a tree",
+        lights: step::ANSWER,
         schedule: "fragment shader; compute with lists of lights",
         resolve: "edges only",
     },
@@ -57,8 +57,8 @@ static INFO: Info = Info {
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
     needs: &[samples::STANDARD_LOCATIONS],
     samples: MULTIPLE_SAMPLES,
-    tessellation: true,
     views: shade::VIEWS,
+    ..Info::USUAL
 };
 
 /// Writes the reference wherever a fragment is.

@@ -11,7 +11,7 @@ use afterlight_frame::{
 };
 use afterlight_shader::Shader;
 use afterlight_stages::{
-    lights::step::StepParams,
+    lights::step::{self, StepParams},
     surfaces::shade,
     surfaces::{
         samples::{self, emission_tag},
@@ -35,7 +35,7 @@ static INFO: Info = Info {
     ],
     answers: Answers {
         surface: "G-buffer, multisampled",
-        lights: "loop over all, tiles, clusters, or a tree",
+        lights: step::ANSWER,
         schedule: "compute, a thread a pixel",
         resolve: "shade all samples",
     },
@@ -51,8 +51,8 @@ static INFO: Info = Info {
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
     needs: &[samples::STANDARD_LOCATIONS],
     samples: MULTIPLE_SAMPLES,
-    tessellation: true,
     views: shade::VIEWS,
+    ..Info::USUAL
 };
 
 impl Technique for DeferredSsaa {

@@ -45,10 +45,9 @@ static INFO: Info = Info {
         rates_decoupled: "n, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
-    needs: &[],
     samples: ANY_SAMPLES,
-    tessellation: true,
     views: &["invocations"],
+    ..Info::USUAL
 };
 
 impl Technique for Forward {

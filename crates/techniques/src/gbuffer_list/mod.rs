@@ -14,11 +14,11 @@ use afterlight_graph::{BufferHandle, BufferRole, DepthTest, Graph, ImageHandle, 
 use afterlight_cost::{Cost, Workload};
 use afterlight_frame::{
     ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, OpaqueDepth, Params, Source,
-    Technique, TechniqueError, params::Words,
+    Technique, TechniqueError, params::Words, set_constants,
 };
 use afterlight_shader::Shader;
 use afterlight_stages::{
-    lights::cells,
+    lights::{cells, step},
     surfaces::claims::{NOT_TAKEN, claims},
     surfaces::{depth_first::FIRST_FRAGMENT, geometry::SceneDraws, shade, visible::Visible},
     surfaces::{samples, shade::SurfaceSource},
@@ -37,7 +37,7 @@ static INFO: Info = Info {
     sources: &[Source { key: "fridvalszky-2020", section: "3 to 5" }],
     answers: Answers {
         surface: "G-buffer, per-pixel lists",
-        lights: "loop over all, tiles, clusters, or a tree",
+        lights: step::ANSWER,
         schedule: "compute, a thread a pixel",
         resolve: "once a triangle, weighted by coverage",
     },
@@ -56,6 +56,7 @@ static INFO: Info = Info {
     samples: ANY_SAMPLES,
     tessellation: false,
     views: shade::VIEWS,
+    ..Info::USUAL
 };
 
 /// Most blocks that a narrow pointer tells apart: 26 bits of index.
@@ -163,6 +164,16 @@ enum Samples {
     Keys(BufferHandle),
 }
 
+impl Samples {
+    /// Where the surfaces stand.
+    fn surfaces(&self, samples: u32) -> cells::VisibleDepths<'_> {
+        match self {
+            Self::Keys(keys) => cells::VisibleDepths::of_keys(keys, samples),
+            Self::Depth(depth) => cells::VisibleDepths::of_depth(depth, samples),
+        }
+    }
+}
+
 impl Technique for GbufferList {
     fn info(&self) -> &Info {
         &INFO
@@ -193,20 +204,14 @@ impl Technique for GbufferList {
             Samples::Depth(_) if layout.samples == 1 => "one",
             Samples::Depth(_) => "",
         };
-        let surfaces = match &lists.samples {
-            Samples::Keys(keys) => cells::VisibleDepths::of_keys(keys, layout.samples),
-            Samples::Depth(depth) => cells::VisibleDepths::of_depth(depth, layout.samples),
-        };
         let radiance = shade::shade(
             graph,
             frame,
             (INFO.id, params.light_step().method(frame)),
             SurfaceSource { folder: "gbuffer_list", tag, shading_tag: None, samples: layout.samples },
-            &surfaces,
+            &lists.samples.surfaces(layout.samples),
             &|pass| {
-                for (name, value) in layout.constants() {
-                    pass.constant(name, value);
-                }
+                set_constants(pass, layout.constants());
                 pass.constant("KEEPS_ALL", u32::from(layout.keeps_all));
                 pass.read_buffer("Blocks", &lists.blocks);
                 match &lists.samples {
@@ -215,7 +220,6 @@ impl Technique for GbufferList {
                 }
             },
         )?;
-        drop(surfaces);
         if let Samples::Depth(depth) = lists.samples {
             frame.board.put(OpaqueDepth(depth));
         }
@@ -263,9 +267,7 @@ fn fill_by_compute(
     let (blocks, count, flagged) = empty_lists(graph, frame, layout, &params.filter.objects)?;
     let shader = frame.shader(&format!("gbuffer_list/fill.comp{}", visible.tag('#')))?;
     let mut pass = frame.compute(graph, "gbuffer-list/fill", PassRole::Geometry, &shader);
-    for (name, value) in build_constants(layout, &params.filter) {
-        pass.constant(&name, value);
-    }
+    set_constants(&mut pass, build_constants(layout, &params.filter));
     visible.bind(frame, &mut pass);
     pass.read("SingleSampleDraws", &flagged);
     let blocks = pass.write("Blocks", blocks);

@@ -61,9 +61,7 @@ static INFO: Info = Info {
     },
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
     needs: &[Need { name: "independent blending", test: |features| features.independent_blend }],
-    samples: &[1],
-    tessellation: true,
-    views: &[],
+    ..Info::USUAL
 };
 
 /// Names the owner of a pixel: the stencil reference of what is nearest so far.

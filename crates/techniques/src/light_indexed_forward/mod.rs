@@ -45,10 +45,7 @@ static INFO: Info = Info {
         rates_decoupled: "n, n",
     },
     exactness: indices::EXACTNESS,
-    needs: &[],
-    samples: &[1],
-    tessellation: true,
-    views: &[],
+    ..Info::USUAL
 };
 
 impl Technique for LightIndexedForward {

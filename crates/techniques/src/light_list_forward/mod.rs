@@ -46,10 +46,8 @@ static INFO: Info = Info {
         rates_decoupled: "n, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
-    needs: &[],
     samples: ANY_SAMPLES,
-    tessellation: true,
-    views: &[],
+    ..Info::USUAL
 };
 
 impl Technique for LightListForward {

@@ -4,10 +4,9 @@
 
 pub mod cost;
 
-use crate::forward_by_cells::ForwardByCells;
 use afterlight_cost::Workload;
 use afterlight_frame::{ANY_SAMPLES, Answers, AppendixA, Exactness, Info, Source};
-use afterlight_stages::lights::cells::{TileParams, Division};
+use afterlight_stages::{lights::cells::{TileParams, Division}, surfaces::depth_first::ForwardByCells};
 
 /// The technique.
 pub static TECHNIQUE: ForwardByCells<TileParams> = ForwardByCells {
@@ -32,10 +31,8 @@ pub static TECHNIQUE: ForwardByCells<TileParams> = ForwardByCells {
             rates_decoupled: "n, n",
         },
         exactness: Exactness::Exact { min_psnr_db: 50.0 },
-        needs: &[],
         samples: ANY_SAMPLES,
-        tessellation: true,
-        views: &[],
+        ..Info::USUAL
     },
     division: Division::Tiles,
     cost: |workload, pixels| cost::tiled_forward(&Workload { pixels_a_tile: pixels, ..*workload }),

@@ -12,13 +12,13 @@ use afterlight_graph::{BufferRole, Graph, ImageHandle, Load, PassRole, gpu::vk};
 use afterlight_cost::{Cost, Workload};
 use afterlight_frame::{
     Answers, AppendixA, Exactness, Frame, Info, OpaqueDepth, Params, Source, SourceSlots, Technique,
-    TechniqueError,
+    TechniqueError, set_constants,
 };
 use afterlight_shader::Shader;
 use afterlight_stages::{
     lights::{
         cells::VisibleDepths,
-        step::LightStep,
+        step::{self, LightStep},
     },
     surfaces::{compute_raster, geometry, shade::add_volumes},
 };
@@ -36,7 +36,7 @@ static INFO: Info = Info {
     sources: &[Source { key: "petrescu-2016", section: "4.11" }, Source { key: "burns-2013", section: "3" }],
     answers: Answers {
         surface: "triangle IDs",
-        lights: "loop over all, tiles, clusters, or a tree",
+        lights: step::ANSWER,
         schedule: "compute, a thread a pixel",
         resolve: "one sample",
     },
@@ -50,10 +50,8 @@ static INFO: Info = Info {
         rates_decoupled: "y, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 45.0 },
-    needs: &[],
-    samples: &[1],
     tessellation: false,
-    views: &[],
+    ..Info::USUAL
 };
 
 /// What a pixel without a surface holds: `NO_TRIANGLE` in `include/scene.glsl`.
@@ -142,9 +140,7 @@ fn shade(
     );
     bind(&mut pass);
     step.bind(frame, &mut pass);
-    for (constant, value) in step.constants() {
-        pass.constant(&constant, value);
-    }
+    set_constants(&mut pass, step.constants());
     let radiance = pass.write("hdr", radiance);
     pass.dispatch(frame.groups(8));
     pass.finish();

@@ -19,6 +19,9 @@ pub use params::{
 /// Lights up to which a loop over all of them costs less than any structure, by `auto`.
 const FEW_LIGHTS: u32 = 16;
 
+/// What a technique with these parameters answers to how lights and surfaces find each other.
+pub const ANSWER: &str = "loop over all, light volumes, lists, tiles, clusters, or a tree";
+
 /// How surfaces find their lights, where nothing is left open.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LightMethod {

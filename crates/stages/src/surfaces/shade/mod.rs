@@ -10,7 +10,7 @@ use crate::lights::{
     step::{LightMethod, LightStep},
     volumes,
 };
-use afterlight_frame::{Frame, Slots, SourceSlots, TechniqueError, views};
+use afterlight_frame::{Frame, Slots, SourceSlots, TechniqueError, set_constants, views};
 
 /// Views of techniques that end in [`shade`].
 pub const VIEWS: &[&str] = &[views::SAMPLE_USAGE, views::INVOCATIONS, views::EDGES, views::WEIGHTS];
@@ -75,12 +75,8 @@ pub fn shade(
         frame.image_info(vk::Format::R16G16B16A16_SFLOAT),
     );
     let mut pass = frame.compute(graph, &format!("{technique}/shade"), PassRole::Shading, &shader);
-    for (name, value) in shade_constants(frame, samples) {
-        pass.constant(name, value);
-    }
-    for (name, value) in step.constants() {
-        pass.constant(&name, value);
-    }
+    set_constants(&mut pass, shade_constants(frame, samples));
+    set_constants(&mut pass, step.constants());
     bind(&mut pass);
     step.bind(frame, &mut pass);
     let radiance = pass.write("hdr", radiance);

@@ -1,10 +1,14 @@
-//! Forward shading by the lists of lights of cells, which techniques make that differ in how they divide the view.
+//! Forward shading by the lists of lights of cells, for techniques that differ in how they divide the view.
 
 use afterlight_cost::{Cost, Workload};
 use afterlight_frame::{Frame, Info, ParamSet, Params, Technique, TechniqueError};
 use afterlight_graph::{Graph, ImageHandle};
-use afterlight_shader::Shader;
-use afterlight_stages::{lights::cells::Division, surfaces::depth_first::record_forward};
+
+use super::{draw_depth, shade_forward};
+use crate::lights::{
+    cells::{self, Division, VisibleDepths},
+    step::LightStep,
+};
 
 /// A depth pre-pass, lists of lights of the cells that it shows, and forward shading by them; the technique's parameters say how the
 /// view is divided.
@@ -28,10 +32,6 @@ impl<P: ParamSet + Default + Copy> Technique for ForwardByCells<P> {
         &self.info
     }
 
-    fn shaders(&self) -> &[Shader] {
-        &crate::SHADERS
-    }
-
     fn params(&self) -> Params {
         Params::of(P::default())
     }
@@ -41,6 +41,11 @@ impl<P: ParamSet + Default + Copy> Technique for ForwardByCells<P> {
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
-        record_forward(graph, frame, self.info.id, self.division(frame.params))
+        let technique = self.info.id;
+        let division = self.division(frame.params);
+        let depth = draw_depth(graph, frame, technique)?;
+        let lists =
+            cells::build(graph, frame, technique, division, &VisibleDepths::of_depth(&depth, frame.samples))?;
+        shade_forward(graph, frame, technique, depth, &LightStep::Cells(lists))
     }
 }
