@@ -6,8 +6,7 @@ use afterlight_stages::lights::{
 };
 use afterlight_techniques::{
     DrawOrder, DrawParams, Params,
-    dais::{CacheParams, DaisParams, Fill},
-    dais_multirate::{Rate, RateParams},
+    dais::{CacheParams, DaisParams, Fill, Rate, RateParams},
     deferred::DeferredParams,
     find,
     gbuffer_list::{Filter, FilterParams, GbufferListParams},

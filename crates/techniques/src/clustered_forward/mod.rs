@@ -5,7 +5,10 @@
 pub mod cost;
 
 use afterlight_frame::{ANY_SAMPLES, Answers, AppendixA, Exactness, Info, Source};
-use afterlight_stages::{lights::cells::{ClusterParams, Division}, surfaces::depth_first::ForwardByCells};
+use afterlight_stages::{
+    lights::cells::{ClusterParams, Division},
+    surfaces::depth_first::ForwardByCells,
+};
 
 /// The technique.
 pub static TECHNIQUE: ForwardByCells<ClusterParams> = ForwardByCells {
@@ -13,7 +16,10 @@ pub static TECHNIQUE: ForwardByCells<ClusterParams> = ForwardByCells {
         id: "clustered-forward",
         title: "Clustered forward shading",
         summary: "A pass for depth alone; each part of the view that holds a surface lists its lights; then forward shading by the lists.",
-        sources: &[Source { key: "petrescu-2016", section: "4.10" }, Source { key: "olsson-2012", section: "3" }],
+        sources: &[
+            Source { key: "petrescu-2016", section: "4.10" },
+            Source { key: "olsson-2012", section: "3" },
+        ],
         answers: Answers {
             surface: "nothing (depth)",
             lights: "clusters",

@@ -2,9 +2,12 @@
 
 // ORDER: 140
 
+mod low_rate;
 mod params;
 mod passes;
 
+pub(crate) use low_rate::LowRate;
+pub use low_rate::{Rate, RateParams, Share};
 pub use params::{CacheParams, DaisParams, Fill, FillParams};
 pub(crate) use passes::{FillPass, depth_surfaces};
 
@@ -12,15 +15,17 @@ pub mod cost;
 
 use afterlight_graph::{BufferHandle, BufferRole, Graph, ImageHandle, Load, PassRole, RasterPass, gpu::vk};
 
-use crate::dais_multirate::LowRate;
 use afterlight_cost::{Cost, Workload};
 use afterlight_frame::{
-    ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, OpaqueDepth, Params,
-    Source, SourceSlots, Technique, TechniqueError, views,
+    ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, OpaqueDepth, Params, Source, SourceSlots,
+    Technique, TechniqueError, views,
 };
 use afterlight_shader::Shader;
 use afterlight_stages::{
-    lights::{cells, step::{self, LightMethod}},
+    lights::{
+        cells,
+        step::{self, LightMethod},
+    },
     surfaces::shade::SurfaceSource,
     surfaces::{
         compute_raster::{ComputeRasterParams, Visibility},
@@ -179,8 +184,7 @@ pub(crate) fn record(
         triangles.bind(pass);
     };
     let source = source_of(frame, &tag);
-    let radiance =
-        shade(graph, frame, asked, (source, &visible.surfaces()), &triangles.records, &bind)?;
+    let radiance = shade(graph, frame, asked, (source, &visible.surfaces()), &triangles.records, &bind)?;
     if let Visible::Ids { depth, .. } = visible {
         frame.board.put(OpaqueDepth(depth));
     }
@@ -224,11 +228,7 @@ fn is_cached(
     visibility: Visibility,
 ) -> Result<bool, TechniqueError> {
     let conflict = |found: &str, expected: &str| {
-        Err(TechniqueError::Conflict {
-            technique,
-            found: found.to_owned(),
-            expected: expected.to_owned(),
-        })
+        Err(TechniqueError::Conflict { technique, found: found.to_owned(), expected: expected.to_owned() })
     };
     let cached = match (fill, frame.tessellate_px.is_some()) {
         (Fill::Resolve, true) => {

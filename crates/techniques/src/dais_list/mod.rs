@@ -9,14 +9,11 @@ pub use params::DaisListParams;
 
 use afterlight_graph::{BufferHandle, BufferRole, Graph, ImageHandle, ImageInfo, Load, PassRole, RasterPass};
 
-use crate::{
-    dais::{self, Asked, Cache, CacheParams, FillPass},
-    dais_multirate::LowRate,
-};
+use crate::dais::{self, Asked, Cache, CacheParams, FillPass, LowRate};
 use afterlight_cost::{Cost, Workload};
 use afterlight_frame::{
-    Answers, Exactness, Frame, Info, MULTIPLE_SAMPLES, Need, Params, Source,
-    SourceSlots, Technique, TechniqueError, capacity::FIRST_GUESS, params::AutoOr, scene::DRAW_TRIANGLES, views,
+    Answers, Exactness, Frame, Info, MULTIPLE_SAMPLES, Need, Params, Source, SourceSlots, Technique,
+    TechniqueError, capacity::FIRST_GUESS, params::AutoOr, scene::DRAW_TRIANGLES, views,
 };
 use afterlight_shader::Shader;
 use afterlight_stages::{

@@ -1,10 +1,12 @@
 //! Parameters of `dais-list`.
 
 use afterlight_frame::params::{AutoOr, parameters};
-use afterlight_stages::lights::{cells::CellParams, step::{LightParams, LightStepParams}};
+use afterlight_stages::lights::{
+    cells::CellParams,
+    step::{LightParams, LightStepParams},
+};
 
-use crate::dais::CacheParams;
-use crate::dais_multirate::RateParams;
+use crate::dais::{CacheParams, RateParams};
 
 parameters! {
     /// Parameters of `dais-list`.

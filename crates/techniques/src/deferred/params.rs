@@ -1,8 +1,10 @@
 //! Parameters of `deferred`.
 
 use afterlight_frame::params::parameters;
-use afterlight_stages::lights::{cells::CellParams, step::{GbufferLightParams, LightStepParams}};
-
+use afterlight_stages::lights::{
+    cells::CellParams,
+    step::{GbufferLightParams, LightStepParams},
+};
 
 parameters! {
     /// Parameters of `deferred`.

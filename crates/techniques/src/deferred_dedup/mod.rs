@@ -82,14 +82,10 @@ impl Technique for DeferredDedup {
             shading_tag: emission_tag(frame),
             samples: frame.samples,
         };
-        let radiance = shade::shade(
-            graph,
-            frame,
-            (INFO.id, lights),
-            source,
-            &filled.surfaces(frame),
-            &|pass| filled.bind(pass),
-        )?;
+        let radiance =
+            shade::shade(graph, frame, (INFO.id, lights), source, &filled.surfaces(frame), &|pass| {
+                filled.bind(pass)
+            })?;
         frame.board.put(OpaqueDepth(filled.depth));
         Ok(radiance)
     }

@@ -13,9 +13,7 @@ use afterlight_frame::{
 };
 use afterlight_shader::Shader;
 use afterlight_stages::{
-    surfaces::depth_first::shaded_surfaces,
-    surfaces::RadianceTarget,
-    views::InvocationCount,
+    surfaces::RadianceTarget, surfaces::depth_first::shaded_surfaces, views::InvocationCount,
 };
 
 /// The technique.

@@ -14,8 +14,8 @@ use glam::Vec3;
 
 use afterlight_cost::{Cost, Workload};
 use afterlight_frame::{
-    Answers, AppendixA, Exactness, Frame, Info, OpaqueDepth, Params, Source, Technique,
-    TechniqueError, camera_view::screen_rect,
+    Answers, AppendixA, Exactness, Frame, Info, OpaqueDepth, Params, Source, Technique, TechniqueError,
+    camera_view::screen_rect,
 };
 use afterlight_shader::Shader;
 use afterlight_stages::surfaces::{depth_first::FIRST_FRAGMENT, geometry::SceneDraws};

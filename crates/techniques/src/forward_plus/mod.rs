@@ -6,7 +6,10 @@ pub mod cost;
 
 use afterlight_cost::Workload;
 use afterlight_frame::{ANY_SAMPLES, Answers, AppendixA, Exactness, Info, Source};
-use afterlight_stages::{lights::cells::{TileParams, Division}, surfaces::depth_first::ForwardByCells};
+use afterlight_stages::{
+    lights::cells::{Division, TileParams},
+    surfaces::depth_first::ForwardByCells,
+};
 
 /// The technique.
 pub static TECHNIQUE: ForwardByCells<TileParams> = ForwardByCells {

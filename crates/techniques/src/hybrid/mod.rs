@@ -12,8 +12,7 @@ use afterlight_graph::{
 use crate::light_prepass::{self, SUMS};
 use afterlight_cost::{Cost, Workload};
 use afterlight_frame::{
-    Answers, AppendixA, Exactness, Frame, Info, Need, Params, Source, Technique,
-    TechniqueError,
+    Answers, AppendixA, Exactness, Frame, Info, Need, Params, Source, Technique, TechniqueError,
 };
 use afterlight_shader::Shader;
 use afterlight_stages::surfaces::{

@@ -9,7 +9,10 @@ use afterlight_graph::{Graph, ImageHandle, gpu::vk};
 use afterlight_cost::{Cost, Workload};
 use afterlight_frame::{Answers, AppendixA, Frame, Info, Params, Source, Technique, TechniqueError};
 use afterlight_shader::Shader;
-use afterlight_stages::{lights::indices::{self, LightIndexParams}, surfaces::gbuffer};
+use afterlight_stages::{
+    lights::indices::{self, LightIndexParams},
+    surfaces::gbuffer,
+};
 
 /// The technique.
 pub static TECHNIQUE: LightIndexed = LightIndexed;

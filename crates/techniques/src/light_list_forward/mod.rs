@@ -12,7 +12,10 @@ use afterlight_frame::{
 };
 use afterlight_shader::Shader;
 use afterlight_stages::{
-    lights::{pixel_lists::{self, LightListParams}, step::LightStep},
+    lights::{
+        pixel_lists::{self, LightListParams},
+        step::LightStep,
+    },
     surfaces::depth_first::{draw_depth, shade_forward},
 };
 

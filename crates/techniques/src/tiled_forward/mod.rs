@@ -6,7 +6,10 @@ pub mod cost;
 
 use afterlight_cost::Workload;
 use afterlight_frame::{ANY_SAMPLES, Answers, AppendixA, Exactness, Info, Source};
-use afterlight_stages::{lights::cells::{TileParams, Division}, surfaces::depth_first::ForwardByCells};
+use afterlight_stages::{
+    lights::cells::{Division, TileParams},
+    surfaces::depth_first::ForwardByCells,
+};
 
 /// The technique.
 pub static TECHNIQUE: ForwardByCells<TileParams> = ForwardByCells {
@@ -14,7 +17,10 @@ pub static TECHNIQUE: ForwardByCells<TileParams> = ForwardByCells {
         id: "tiled-forward",
         title: "Tiled forward shading",
         summary: "A pass for depth alone; each tile that holds a surface lists its lights; then forward shading by the lists.",
-        sources: &[Source { key: "petrescu-2016", section: "4.8" }, Source { key: "olsson-2011", section: "5" }],
+        sources: &[
+            Source { key: "petrescu-2016", section: "4.8" },
+            Source { key: "olsson-2011", section: "5" },
+        ],
         answers: Answers {
             surface: "nothing (depth)",
             lights: "tiles",

@@ -104,11 +104,7 @@ impl Technique for Visibility {
 }
 
 /// The same from triangles that compute has found.
-fn shade_keys(
-    graph: &mut Graph,
-    frame: &Frame<'_>,
-    small_px: u32,
-) -> Result<ImageHandle, TechniqueError> {
+fn shade_keys(graph: &mut Graph, frame: &Frame<'_>, small_px: u32) -> Result<ImageHandle, TechniqueError> {
     let keys = compute_raster::rasterize(graph, frame, INFO.id, small_px, 1)?;
     shade(graph, frame, "#keys", &VisibleDepths::of_keys(&keys, 1), &|pass| {
         pass.constant("SAMPLES", 1);

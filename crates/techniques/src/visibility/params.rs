@@ -2,10 +2,12 @@
 
 use afterlight_frame::params::parameters;
 use afterlight_stages::{
-    lights::{cells::CellParams, step::{LightParams, LightStepParams}},
+    lights::{
+        cells::CellParams,
+        step::{LightParams, LightStepParams},
+    },
     surfaces::compute_raster::ComputeRasterParams,
 };
-
 
 parameters! {
     /// Parameters of `visibility`.
