@@ -5,10 +5,12 @@ use std::path::PathBuf;
 use afterlight_experiments::{EXPERIMENTS, Options};
 use afterlight_lab::FrameSpec;
 use afterlight_lab::spec::{DEFAULT_SCENE, FRAMES_MAX, LIGHTS_MAX};
-use afterlight_techniques::geometry::{MAX_DISPLACEMENT_M, MAX_TESSELLATE_PX, MIN_TESSELLATE_PX};
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, Parser, Subcommand};
 
-use crate::failure::Failure;
+use crate::{
+    effects::{self, EffectArgs},
+    failure::Failure,
+};
 
 /// A workbench of deferred-shading techniques: one scene, one image, many ways, each one timed.
 #[derive(Debug, Parser)]
@@ -133,35 +135,31 @@ pub struct CompareArgs {
 }
 
 /// Options that a specification holds, so that they cannot stand beside `--spec`.
-const NOT_WITH_SPEC: &[&str] = &[
-    "scale",
-    "scenes",
-    "light_counts",
-    "techniques",
-    "frames",
-    "max_pairs",
-    "max_commands",
-    "views",
-    "path",
-    "width",
-    "height",
-    "samples",
-    "lights",
-    "light_seed",
-    "camera",
-    "set",
-    "device",
-    "time",
-    "post",
-    "tessellate",
-    "displacement",
-    "shadows",
-    "shadow_map_size",
-    "indirect",
-    "transparency",
-    "view",
-    "validate",
-];
+fn not_with_spec() -> Vec<&'static str> {
+    let own = [
+        "scale",
+        "scenes",
+        "light_counts",
+        "techniques",
+        "frames",
+        "max_pairs",
+        "max_commands",
+        "views",
+        "path",
+        "width",
+        "height",
+        "samples",
+        "lights",
+        "light_seed",
+        "camera",
+        "set",
+        "device",
+        "time",
+        "view",
+        "validate",
+    ];
+    own.into_iter().chain(effects::names()).collect()
+}
 
 /// Arguments of `bench`. What is not given is the experiment's own.
 #[derive(Clone, Debug, Args)]
@@ -169,7 +167,7 @@ pub struct BenchArgs {
     #[arg(value_name = "EXPERIMENT|all", help = experiments_help())]
     pub experiment: String,
     /// The experiment's specification, a JSON file, in the place of all options but --report, --json and --quiet
-    #[arg(long, value_name = "FILE.json", conflicts_with_all = NOT_WITH_SPEC)]
+    #[arg(long, value_name = "FILE.json", conflicts_with_all = not_with_spec())]
     pub spec: Option<PathBuf>,
     /// Print the specification that the options give, and run nothing
     #[arg(long)]
@@ -274,27 +272,8 @@ pub struct CommonArgs {
     /// Time at which animated nodes are posed, seconds
     #[arg(long, value_name = "SECONDS", value_parser = finite)]
     pub time: Option<f64>,
-    /// Anti-aliasing after shading
-    #[arg(long, value_enum, default_value_t = Post::None)]
-    pub post: Post,
-    /// Tessellates surfaces to triangles with edges of about PX pixels
-    #[arg(long, value_name = "PX", value_parser = tessellate_px)]
-    pub tessellate: Option<f32>,
-    /// Displaces tessellated surfaces by up to MM millimetres along each axis
-    #[arg(long, value_name = "MM", requires = "tessellate", default_value_t = 0.0, value_parser = displacement_mm)]
-    pub displacement: f32,
-    /// Shadows of one light: the first directional or spot light, else the strongest point light
-    #[arg(long, value_enum, default_value_t = Shadows::None)]
-    pub shadows: Shadows,
-    /// Width and height of a light's view, texels [default: 2048 for shadows, 512 for indirect light]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
-    pub shadow_map_size: Option<u32>,
-    /// Indirect light
-    #[arg(long, value_enum, default_value_t = Indirect::None)]
-    pub indirect: Indirect,
-    /// Surfaces with alpha blending: sorted back to front, or left out
-    #[arg(long, value_enum, default_value_t = Transparency::Sorted)]
-    pub transparency: Transparency,
+    #[command(flatten)]
+    pub effects: EffectArgs,
     /// What to show: the final image, or a debug view
     #[arg(long, value_name = "final|NAME", default_value = "final")]
     pub view: String,
@@ -306,77 +285,9 @@ pub struct CommonArgs {
     pub quiet: bool,
 }
 
-/// `--post`
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Post {
-    None,
-    Fxaa,
-    Smaa,
-    Sraa,
-}
-
-impl From<Post> for afterlight_techniques::Post {
-    fn from(post: Post) -> Self {
-        match post {
-            Post::None => Self::None,
-            Post::Fxaa => Self::Fxaa,
-            Post::Smaa => Self::Smaa,
-            Post::Sraa => Self::Sraa,
-        }
-    }
-}
-
-/// `--shadows`
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Shadows {
-    None,
-    Map,
-    Pcss,
-}
-
-/// `--transparency`
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Transparency {
-    Sorted,
-    None,
-}
-
-impl From<Transparency> for afterlight_techniques::Transparency {
-    fn from(transparency: Transparency) -> Self {
-        match transparency {
-            Transparency::Sorted => Self::Sorted,
-            Transparency::None => Self::None,
-        }
-    }
-}
-
-/// `--indirect`
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Indirect {
-    None,
-    Rsm,
-}
-
-impl From<Indirect> for afterlight_techniques::Indirect {
-    fn from(indirect: Indirect) -> Self {
-        match indirect {
-            Indirect::None => Self::None,
-            Indirect::Rsm => Self::Rsm,
-        }
-    }
-}
-
 impl CommonArgs {
     /// The frames that the options ask for; refuses what this version does not have yet, and what does not go together.
     pub fn spec(&self) -> Result<FrameSpec, Failure> {
-        let shadows = match self.shadows {
-            Shadows::None => afterlight_techniques::Shadows::None,
-            Shadows::Map => afterlight_techniques::Shadows::Map,
-            Shadows::Pcss => {
-                let expected = "none or map (nothing else is available in this version)";
-                return Err(Failure::option("--shadows", "pcss", expected));
-            }
-        };
         let usual = FrameSpec::default();
         let spec = FrameSpec {
             width: self.width.unwrap_or(usual.width),
@@ -388,13 +299,7 @@ impl CommonArgs {
             set: self.set.clone(),
             device: self.device.clone(),
             time_s: self.time,
-            post: self.post.into(),
-            tessellate_px: self.tessellate,
-            displacement_mm: self.displacement,
-            shadows,
-            shadow_map_size: self.shadow_map_size,
-            indirect: self.indirect.into(),
-            transparency: self.transparency.into(),
+            effects: self.effects.0,
             view: self.view.clone(),
             validate: self.validate,
         };
@@ -414,22 +319,6 @@ fn share(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(share) if share > 0.0 && share <= 1.0 => Ok(share),
         _ => Err("expected a number above 0, at most 1".to_owned()),
-    }
-}
-
-fn tessellate_px(text: &str) -> Result<f32, String> {
-    let range = MIN_TESSELLATE_PX..=MAX_TESSELLATE_PX;
-    match text.parse::<f32>() {
-        Ok(px) if range.contains(&px) => Ok(px),
-        _ => Err(format!("expected a number of pixels from {} to {}", range.start(), range.end())),
-    }
-}
-
-fn displacement_mm(text: &str) -> Result<f32, String> {
-    let max_mm = MAX_DISPLACEMENT_M * 1e3;
-    match text.parse::<f32>() {
-        Ok(mm) if (0.0..=max_mm).contains(&mm) => Ok(mm),
-        _ => Err(format!("expected a number of millimetres from 0 to {max_mm}")),
     }
 }
 
@@ -488,12 +377,10 @@ mod tests {
 
     #[test]
     fn what_is_not_there_yet_is_refused() {
-        for option in [["--shadows", "pcss"], ["--shadow-map-size", "512"]] {
-            let failure = compare(&option).common.spec().expect_err("is refused");
-            let line = failure.lines().remove(0);
-            assert_eq!(failure.code(), 2);
-            assert!(line.starts_with(option[0]) && line.contains("expected"), "{line}");
-        }
+        let failure = compare(&["--shadow-map-size", "512"]).common.spec().expect_err("is refused");
+        let line = failure.lines().remove(0);
+        assert_eq!(failure.code(), 2);
+        assert!(line.starts_with("--shadow-map-size") && line.contains("expected"), "{line}");
         for post in ["none", "fxaa", "smaa", "sraa"] {
             assert!(compare(&["--post", post]).common.spec().is_ok(), "{post}");
         }

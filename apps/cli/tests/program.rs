@@ -185,9 +185,13 @@ fn lists_are_text_and_json() {
 
 #[test]
 fn specifications_are_shown_and_read() {
-    let shown = run(&["bench", "dais-fig5", "--show-spec", "--scale", "0.5", "--views", "3", "--lights", "7"]);
+    let shown =
+        run(&["bench", "dais-fig5", "--show-spec", "--scale", "0.5", "--views", "3", "--lights", "7"]);
     let spec = json(&shown);
-    assert_eq!((&spec["scale"], &spec["views"], &spec["frame"]["lights"]), (&0.5.into(), &3.into(), &7.into()));
+    assert_eq!(
+        (&spec["scale"], &spec["views"], &spec["frame"]["lights"]),
+        (&0.5.into(), &3.into(), &7.into())
+    );
     let folder = folder();
     let show = |text: &str| {
         fs::write(folder.path().join("a.json"), text).expect("written");

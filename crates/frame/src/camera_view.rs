@@ -39,7 +39,7 @@ impl CameraView {
         let near_m = match settings.camera.projection {
             Projection::Perspective { near_m, .. } | Projection::Orthographic { near_m, .. } => near_m,
         };
-        let bounds_ws = scene.bounds_ws(settings.displacement_m);
+        let bounds_ws = scene.bounds_ws(settings.effects.tessellation.displacement_m());
         let to_eye = self.view_from_world.row(2).truncate();
         let (depth_to_distance, eye) = match settings.camera.projection {
             Projection::Perspective { near_m, .. } => {

@@ -1,6 +1,7 @@
 //! What can go wrong between a scene and its image.
 
 use afterlight_graph::{GraphError, gpu::GpuError};
+use afterlight_params::ParamError;
 use afterlight_scene::SceneError;
 
 /// An error of preparing or running a technique: one line that names what, found and expected.
@@ -21,26 +22,9 @@ pub enum TechniqueError {
         /// The name.
         name: String,
     },
-    /// A parameter that no technique has.
-    #[error("parameter {key:?} of {technique}: found no such parameter, expected one of: {known}")]
-    UnknownParam {
-        /// The parameter.
-        key: String,
-        /// The technique.
-        technique: &'static str,
-        /// What it has.
-        known: String,
-    },
-    /// A parameter's value out of range.
-    #[error("parameter {key}: found {found:?}, expected {expected}")]
-    BadParam {
-        /// The parameter.
-        key: String,
-        /// The value.
-        found: String,
-        /// The range.
-        expected: String,
-    },
+    /// A parameter that a technique does not have, or a value out of its range.
+    #[error(transparent)]
+    Param(#[from] ParamError),
     /// Something larger than the device takes.
     #[error("{what}: found {found}, expected at most {limit}")]
     TooLarge {

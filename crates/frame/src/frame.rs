@@ -7,11 +7,10 @@ use afterlight_graph::{
 use afterlight_shader::Shader;
 
 use crate::{
-    Board, Slots, TechniqueError,
+    Board, Params, Slots, TechniqueError,
     capacity::Capacities,
-    params::Params,
     scene::{BUCKETS, SceneGpu, lights::SceneLights},
-    views,
+    set_constants, views,
 };
 
 /// A frame to be recorded: the scene on the device, its buffers imported into the graph, sizes and parameters.
@@ -22,7 +21,7 @@ pub struct Frame<'a> {
     pub height_px: u32,
     /// Visibility samples a pixel.
     pub samples: u32,
-    /// Parameters of the technique.
+    /// Parameters, all of [`crate::params_of`] the technique.
     pub params: &'a Params,
     /// The scene.
     pub scene: &'a SceneGpu,
@@ -216,9 +215,7 @@ impl Frame<'_> {
     ) -> afterlight_graph::ComputePass<'g> {
         let mut pass = graph.compute(name, role, shader);
         self.bind_scene(&mut pass);
-        for (name, bits) in self.constants(&[shader]) {
-            pass.constant(&name, bits);
-        }
+        set_constants(&mut pass, self.constants(&[shader]));
         pass
     }
 

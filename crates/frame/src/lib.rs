@@ -5,15 +5,17 @@
 
 pub use afterlight_cost as cost;
 pub use afterlight_graph as graph;
+pub use afterlight_params as params;
 pub use afterlight_scene as scene_model;
 pub use afterlight_shader as shader;
 
 pub mod board;
 pub mod camera_view;
 pub mod capacity;
+mod draws;
+mod effects;
 mod error;
 mod frame;
-pub mod params;
 pub mod scene;
 mod settings;
 mod slots;
@@ -24,20 +26,22 @@ pub mod views;
 pub use board::{Board, OpaqueDepth, SceneInput, SurfaceNormals, TriangleIds, VisitsAllLights};
 pub use camera_view::CameraView;
 pub use capacity::Counter;
+pub use draws::{Cull, DrawOrder, DrawParams};
+pub use effects::{
+    Effects, Indirect, IndirectEffect, MAX_DISPLACEMENT_MM, MAX_TESSELLATE_PX, MIN_TESSELLATE_PX, Post,
+    PostEffect, ShadowEffect, Shadows, TessellationEffect, Transparency, TransparencyEffect,
+};
 pub use error::TechniqueError;
 pub use frame::{Frame, SceneBuffers};
-pub use params::{ParamInfo, ParamKind, Params};
+pub use params::{ParamError, ParamInfo, ParamKind, ParamSet, Params};
 pub use scene::{
     SceneGpu,
-    draw_list::{DrawOptions, DrawOrder},
     lights::{SceneLights, device_order},
 };
-pub use settings::{
-    DEFAULT_RSM_SIZE_PX, DEFAULT_SHADOW_MAP_SIZE_PX, Indirect, MAX_DISPLACEMENT_M, MAX_TESSELLATE_PX,
-    MIN_TESSELLATE_PX, Post, Settings, Shadows, Transparency,
-};
-pub use slots::{Slots, SourceSlots};
+pub use settings::Settings;
+pub use slots::{Slots, SourceSlots, set_constants};
 pub use technique::{
-    ANY_SAMPLES, Answers, AppendixA, Exactness, Info, MULTIPLE_SAMPLES, Need, Source, Technique,
+    ANY_SAMPLES, Answers, AppendixA, Exactness, Info, MULTIPLE_SAMPLES, Need, Source, Technique, completed,
+    params_of, set_param,
 };
 pub use views::LightPairs;

@@ -18,6 +18,16 @@ pub trait SourceSlots: Slots {
     fn constant(&mut self, name: &str, value: u32);
 }
 
+/// Sets specialization constants.
+pub fn set_constants<N: AsRef<str>>(
+    pass: &mut (impl SourceSlots + ?Sized),
+    constants: impl IntoIterator<Item = (N, u32)>,
+) {
+    for (name, value) in constants {
+        pass.constant(name.as_ref(), value);
+    }
+}
+
 impl SourceSlots for afterlight_graph::ComputePass<'_> {
     fn constant(&mut self, name: &str, value: u32) {
         afterlight_graph::ComputePass::constant(self, name, value);

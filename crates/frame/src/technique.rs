@@ -4,10 +4,7 @@ use afterlight_graph::{Graph, ImageHandle, gpu};
 use afterlight_shader::Shader;
 use serde::Serialize;
 
-use crate::{
-    Frame, TechniqueError,
-    params::{ParamInfo, Params},
-};
+use crate::{DrawParams, Frame, Params, TechniqueError};
 use afterlight_cost::{Cost, Workload};
 
 /// Where a technique comes from.
@@ -94,16 +91,40 @@ pub struct Info {
     pub appendix_a: AppendixA,
     /// Exact or approximate.
     pub exactness: Exactness,
-    /// Its parameters besides those that all have ([`Params::known`]).
-    pub params: &'static [ParamInfo],
     /// What it needs beyond what the program needs.
     pub needs: &'static [Need],
     /// Sample counts that it can render where the device has them.
     pub samples: &'static [u32],
     /// Whether it draws tessellated surfaces: everything that finds triangles again by the index buffer does not.
     pub tessellation: bool,
-    /// Debug views of its own, by name; all that it has: [`crate::views::of`].
+    /// Debug views of its own, by name; besides them it has those of stages that it uses.
     pub views: &'static [&'static str],
+}
+
+impl Info {
+    /// What most techniques have in common, for `..Info::USUAL` after what is a technique's own: one sample a pixel, tessellated surfaces,
+    /// no needs, no views.
+    pub const USUAL: Info = Info {
+        id: "",
+        title: "",
+        summary: "",
+        sources: &[],
+        answers: Answers { surface: "", lights: "", schedule: "", resolve: "" },
+        appendix_a: AppendixA {
+            id: "",
+            intersect: "",
+            transparency: "",
+            hardware_msaa: "",
+            light_access: "",
+            material_access: "",
+            rates_decoupled: "",
+        },
+        exactness: Exactness::Exact { min_psnr_db: 50.0 },
+        needs: &[],
+        samples: &[1],
+        tessellation: true,
+        views: &[],
+    };
 }
 
 /// Every sample count that a device may have.
@@ -121,7 +142,13 @@ pub trait Technique: Send + Sync {
         &[]
     }
 
-    /// Predicts its costs for a workload by the formulas of Petrescu et al. 2016, section 4. Pure arithmetic.
+    /// The defaults of its own parameters; what sets them by text asks for [`params_of`].
+    fn params(&self) -> Params {
+        Params::default()
+    }
+
+    /// Predicts its costs for a workload by the formulas of Petrescu et al. 2016, section 4. Pure arithmetic. The parameters are all of
+    /// [`params_of`], whatever their values.
     fn predict(&self, workload: &Workload, params: &Params) -> Cost;
 
     /// Declares its passes, named `id/stage`, and returns the image of linear radiance, RGBA16F, that they end in.
@@ -140,4 +167,27 @@ pub trait Technique: Send + Sync {
     fn missing(&self, features: &gpu::Features) -> Vec<&'static str> {
         self.info().needs.iter().filter(|n| !(n.test)(features)).map(|n| n.name).collect()
     }
+}
+
+/// All parameters that a technique has, with their defaults: those of every technique, then its own.
+pub fn params_of(technique: &dyn Technique) -> Params {
+    Params::of(DrawParams::default()).and(technique.params())
+}
+
+/// All parameters of a technique, with the values that `params` has for them; what is not there has its default.
+pub fn completed(technique: &dyn Technique, params: &Params) -> Params {
+    params.over(params_of(technique))
+}
+
+/// Sets a parameter of a technique from text, among [`params_of`] it.
+///
+/// # Errors
+/// A name that the technique does not have, a value out of range: both list what is known.
+pub fn set_param(
+    technique: &dyn Technique,
+    params: &mut Params,
+    key: &str,
+    value: &str,
+) -> Result<(), TechniqueError> {
+    Ok(params.set(key, value).map_err(|error| error.of(technique.info().id))?)
 }

@@ -4,11 +4,6 @@
 
 use half::f16;
 
-use crate::{
-    Technique,
-    params::{CLUSTER_PX, Params, TILE_PX},
-};
-
 /// The image itself.
 pub const FINAL: &str = "final";
 
@@ -39,14 +34,6 @@ pub const TEXTURE_ERROR: &str = "texture-error";
 /// Views of techniques whose samples refer to records of a triangle buffer.
 pub const TRIANGLES: &[&str] =
     &[SAMPLE_USAGE, INVOCATIONS, EDGES, WEIGHTS, TRIANGLE_SHARING, ATTRIBUTE_ERROR, TEXTURE_ERROR];
-
-/// Debug views that a technique has besides [`FINAL`]: its own, those of light pairs, and that of cells.
-pub fn of(technique: &dyn Technique) -> Vec<&'static str> {
-    let pairs = if technique.counts_light_pairs() { LIGHT_PAIRS } else { &[] };
-    let has_cells = Params::known(technique.info()).any(|p| [TILE_PX.key, CLUSTER_PX.key].contains(&p.key));
-    let cells = if has_cells { &[CLUSTERS][..] } else { &[] };
-    technique.info().views.iter().chain(pairs).chain(cells).copied().collect()
-}
 
 /// Whether a view is one of [`RecordSource`].
 pub fn is_of_triangles(view: &str) -> bool {

@@ -1,6 +1,6 @@
 //! Techniques that were asked for, with their parameters.
 
-use afterlight_techniques::{Params, Technique, registry};
+use afterlight_techniques::{Params, Technique, params_of, registry, set_param};
 
 use crate::LabError;
 
@@ -8,11 +8,24 @@ use crate::LabError;
 pub struct Chosen {
     /// The technique.
     pub technique: &'static dyn Technique,
-    /// Its parameters; what is not set has its default.
+    /// Its parameters.
     pub params: Params,
 }
 
 impl Chosen {
+    /// A technique with the defaults of its parameters.
+    pub fn new(technique: &'static dyn Technique) -> Self {
+        Self { technique, params: params_of(technique) }
+    }
+
+    /// Sets a parameter.
+    ///
+    /// # Errors
+    /// Keys and values that are not known.
+    pub fn set(&mut self, key: &str, value: &str) -> Result<(), LabError> {
+        Ok(set_param(self.technique, &mut self.params, key, value)?)
+    }
+
     /// Its id.
     pub fn id(&self) -> &'static str {
         self.technique.info().id
@@ -45,8 +58,7 @@ pub fn choose(setting: &'static str, ids: &[String], sets: &[String]) -> Result<
             }
         }
     }
-    let mut chosen: Vec<Chosen> =
-        techniques.into_iter().map(|technique| Chosen { technique, params: Params::default() }).collect();
+    let mut chosen: Vec<Chosen> = techniques.into_iter().map(Chosen::new).collect();
     for set in sets {
         apply(&mut chosen, set)?;
     }
@@ -64,14 +76,12 @@ fn apply(chosen: &mut [Chosen], set: &str) -> Result<(), LabError> {
             let expected = format!("one of the techniques that run: {}", known.join(", "));
             return Err(LabError::setting("set", format!("technique {id:?}"), expected));
         };
-        one.params.set(one.technique.info(), key, value)?;
-        return Ok(());
+        return one.set(key, value);
     }
     let mut taken = false;
     for one in chosen.iter_mut() {
-        let info = one.technique.info();
-        if Params::known(info).any(|param| param.key == name) {
-            one.params.set(info, name, value)?;
+        if one.params.has(name) {
+            one.set(name, value)?;
             taken = true;
         }
     }
@@ -79,7 +89,7 @@ fn apply(chosen: &mut [Chosen], set: &str) -> Result<(), LabError> {
         return Ok(());
     }
     let mut known: Vec<&str> =
-        chosen.iter().flat_map(|one| Params::known(one.technique.info())).map(|param| param.key).collect();
+        chosen.iter().flat_map(|one| one.params.infos()).map(|param| param.key).collect();
     known.sort_unstable();
     known.dedup();
     Err(LabError::setting("set", format!("parameter {name:?}"), format!("one of: {}", known.join(", "))))
@@ -124,9 +134,7 @@ mod tests {
             &ids(&["cull=none", "deferred.order=scene"]),
         )
         .expect("known");
-        let text = |index: usize, key: &str| {
-            chosen[index].params.text(chosen[index].technique.info(), key).to_owned()
-        };
+        let text = |index: usize, key: &str| chosen[index].params.get(key).expect("every technique has it");
         assert_eq!((text(0, "cull"), text(1, "cull")), ("none".into(), "none".into()));
         assert_eq!((text(0, "order"), text(1, "order")), ("center".into(), "scene".into()));
     }

@@ -105,7 +105,7 @@ fn judge(result: &mut RunResult, info: &Info, psnr_db: f64, spec: &FrameSpec, re
         return;
     }
     // A filter decides by the image: a difference of rounding may become another decision.
-    let is_plain = spec.samples == 1 && spec.post == Post::None;
+    let is_plain = spec.samples == 1 && spec.effects.post.filter == Post::None;
     let least_db = match info.exactness {
         Exactness::Exact { min_psnr_db } if is_plain => min_psnr_db,
         Exactness::Exact { .. } => MULTISAMPLE_PSNR_DB,

@@ -9,7 +9,7 @@ use afterlight_measure::{DeviceRecord, SceneRecord, SettingsRecord};
 use afterlight_scene::camera::CameraPath;
 use afterlight_scene::{Camera, LoadOptions, Scene, camera, lights, load_source};
 use afterlight_techniques::cost::Workload;
-use afterlight_techniques::{Indirect, Renderer, SceneGpu, Settings, Shadows};
+use afterlight_techniques::{Effects, Indirect, Renderer, SceneGpu, Settings, Shadows};
 
 use crate::spec::SAMPLES;
 use crate::{FrameSpec, LabError, Listener};
@@ -131,7 +131,7 @@ impl Session {
         let from_file = file.map(CameraPath::load).transpose()?;
         let (device, scene, load_ms) = load(source, spec, listener)?;
         let path = from_file.unwrap_or_else(|| CameraPath::fly_through(&scene));
-        if spec.indirect != Indirect::None && spec.lights == 0 && scene.lights.is_empty() {
+        if spec.effects.indirect.method != Indirect::None && spec.lights == 0 && scene.lights.is_empty() {
             spec.lights = 1;
         }
         let session = Session::with_device(&device, source, scene, spec, false, listener, load_ms)?;
@@ -187,19 +187,9 @@ impl Session {
             lights,
             environment: scene.environment,
             keep_hdr,
-            post: spec.post,
-            tessellate_px: spec.tessellate_px,
-            displacement_m: spec.displacement_mm * 1e-3,
+            effects: spec.effects,
             view: spec.view.clone(),
-            indirect: spec.indirect,
-            shadows: spec.shadows,
-            transparency: spec.transparency,
             ..Settings::for_scene(&scene, spec.width, spec.height)
-        };
-        let settings = Settings {
-            rsm_size_px: spec.shadow_map_size.unwrap_or(settings.rsm_size_px),
-            shadow_map_size_px: spec.shadow_map_size.unwrap_or(settings.shadow_map_size_px),
-            ..settings
         };
         let bar = listener.task("textures", scene.images.len() as u64);
         let on_device = SceneGpu::upload(device, &scene, &|done, steps| {
@@ -240,7 +230,7 @@ impl Session {
 
     /// The settings as a run record keeps them.
     pub fn settings_record(&self, spec: &FrameSpec, frames: u32, reference: &str) -> SettingsRecord {
-        let settings = self.renderer.settings();
+        let Effects { post, tessellation, shadows, indirect, transparency } = spec.effects;
         SettingsRecord {
             width: spec.width,
             height: spec.height,
@@ -248,14 +238,14 @@ impl Session {
             frames,
             camera: self.camera.clone(),
             reference: reference.to_owned(),
-            post: spec.post.name().to_owned(),
-            tessellate_px: spec.tessellate_px,
-            displacement_mm: spec.displacement_mm,
-            indirect: settings.indirect.name().to_owned(),
-            rsm_size: (settings.indirect == Indirect::Rsm).then_some(settings.rsm_size_px),
-            shadows: settings.shadows.name().to_owned(),
-            shadow_map_size: (settings.shadows == Shadows::Map).then_some(settings.shadow_map_size_px),
-            transparency: settings.transparency.name().to_owned(),
+            post: post.filter.name().to_owned(),
+            tessellate_px: tessellation.edge_px,
+            displacement_mm: tessellation.displacement_mm,
+            indirect: indirect.method.name().to_owned(),
+            rsm_size: (indirect.method == Indirect::Rsm).then_some(indirect.map_size_px),
+            shadows: shadows.method.name().to_owned(),
+            shadow_map_size: (shadows.method == Shadows::Map).then_some(shadows.map_size_px),
+            transparency: transparency.order.name().to_owned(),
             light_seed: (spec.lights > 0).then_some(spec.light_seed),
             version: env!("CARGO_PKG_VERSION").to_owned(),
         }

@@ -3,7 +3,7 @@
 use std::borrow::Borrow;
 
 use afterlight_techniques::cost::Workload;
-use afterlight_techniques::{Params, Post, Renderer, Settings};
+use afterlight_techniques::{Post, Renderer, Settings};
 
 use crate::{Chosen, Entrant, InTurn, LabError, Listener, measure_in_turn, technique};
 
@@ -30,10 +30,9 @@ impl Setup {
         id: &str,
         params: &[(&str, &str)],
     ) -> Result<Setup, LabError> {
-        let technique = technique("technique", id)?;
-        let mut chosen = Chosen { technique, params: Params::default() };
+        let mut chosen = Chosen::new(technique("technique", id)?);
         for (key, value) in params {
-            chosen.params.set(technique.info(), key, value)?;
+            chosen.set(key, value)?;
         }
         Ok(Setup { label: label.into(), samples, post: Post::None, chosen })
     }
@@ -71,7 +70,7 @@ pub fn measure_setups(
             let setup = setup.borrow();
             renderer_with(base, |settings| {
                 settings.samples = setup.samples;
-                settings.post = setup.post;
+                settings.effects.post.filter = setup.post;
             })
         })
         .collect::<Result<Vec<_>, _>>()?;

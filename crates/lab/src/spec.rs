@@ -1,10 +1,9 @@
 //! What frames are drawn of, on which device and how: a specification that a command line, a file or another language fills.
 
-use afterlight_techniques::geometry::{MAX_DISPLACEMENT_M, MAX_TESSELLATE_PX, MIN_TESSELLATE_PX};
-use afterlight_techniques::{Indirect, Post, Shadows, Transparency, view};
+use afterlight_techniques::{Effects, Indirect, ParamError, ParamSet as _, Post, Shadows, view};
 use serde::{Deserialize, Serialize};
 
-use crate::{LabError, names};
+use crate::{LabError, effects};
 
 /// Most seeded lights.
 pub const LIGHTS_MAX: u32 = 1_000_000;
@@ -41,25 +40,9 @@ pub struct FrameSpec {
     pub device: Option<String>,
     /// Time at which animated nodes are posed, seconds; none for the pose of the file.
     pub time_s: Option<f64>,
-    /// Anti-aliasing after shading.
-    #[serde(with = "names::post")]
-    pub post: Post,
-    /// Tessellates surfaces to edges of about so many pixels, [`MIN_TESSELLATE_PX`] to [`MAX_TESSELLATE_PX`]; none for the
-    /// scene's own triangles.
-    pub tessellate_px: Option<f32>,
-    /// Displaces tessellated surfaces by up to so many millimetres along each axis, 0 to 1000 × [`MAX_DISPLACEMENT_M`].
-    pub displacement_mm: f32,
-    /// Shadows of one light: the first directional or spot light, else the strongest point light.
-    #[serde(with = "names::shadows")]
-    pub shadows: Shadows,
-    /// Width and height of a light's view, texels, at least 1; none for 2048 for shadows, 512 for indirect light.
-    pub shadow_map_size: Option<u32>,
-    /// Indirect light.
-    #[serde(with = "names::indirect")]
-    pub indirect: Indirect,
-    /// Surfaces with alpha blending.
-    #[serde(with = "names::transparency")]
-    pub transparency: Transparency,
+    /// Effects, by the names that the command line has for them; what is not said has its default.
+    #[serde(with = "effects")]
+    pub effects: Effects,
     /// What to show: `final`, or a debug view.
     pub view: String,
     /// Turns on Vulkan validation; any message is an error when the session ends.
@@ -78,13 +61,7 @@ impl Default for FrameSpec {
             set: Vec::new(),
             device: None,
             time_s: None,
-            post: Post::None,
-            tessellate_px: None,
-            displacement_mm: 0.0,
-            shadows: Shadows::None,
-            shadow_map_size: None,
-            indirect: Indirect::None,
-            transparency: Transparency::Sorted,
+            effects: Effects::default(),
             view: view::FINAL.to_owned(),
             validate: false,
         }
@@ -105,26 +82,37 @@ impl FrameSpec {
         if let Some(time_s) = self.time_s {
             check("time", time_s, time_s.is_finite(), "a finite number of seconds")?;
         }
-        if let Some(px) = self.tessellate_px {
-            let expected = format!("a number of pixels from {MIN_TESSELLATE_PX} to {MAX_TESSELLATE_PX}");
-            check("tessellate", px, (MIN_TESSELLATE_PX..=MAX_TESSELLATE_PX).contains(&px), expected)?;
-        }
-        let (mm, max_mm) = (self.displacement_mm, MAX_DISPLACEMENT_M * 1e3);
-        let expected = format!("a number of millimetres from 0 to {max_mm}");
-        check("displacement", mm, (0.0..=max_mm).contains(&mm), expected)?;
-        let is_tessellated = self.tessellate_px.is_some() || mm == 0.0;
-        check("displacement", mm, is_tessellated, "0 without tessellation")?;
-        let filters_a_view = self.post != Post::None && self.view != view::FINAL;
+        check_effects(&self.effects)?;
+        let post = self.effects.post.filter;
+        let filters_a_view = post != Post::None && self.view != view::FINAL;
         let expected = "none with a debug view (its colours are values, which no filter may mix)";
-        check("post", self.post.name(), !filters_a_view, expected)?;
-        if let Some(size) = self.shadow_map_size {
-            let has_map = self.shadows != Shadows::None || self.indirect != Indirect::None;
-            let expected = "no such option without --shadows map or --indirect rsm";
-            check("shadow-map-size", size, has_map, expected)?;
-            check("shadow-map-size", size, size >= 1, "a whole number of texels, at least 1")?;
-        }
+        check("post", post.name(), !filters_a_view, expected)?;
         Ok(())
     }
+}
+
+/// Refuses effects out of their ranges, and what does nothing without another effect.
+fn check_effects(effects: &Effects) -> Result<(), LabError> {
+    for info in effects.described() {
+        if let Err(ParamError::Value { found, expected, .. }) =
+            Effects::default().set(info.key, &info.default)
+        {
+            return Err(LabError::setting(info.key, found, expected));
+        }
+    }
+    let Effects { tessellation, shadows, indirect, .. } = effects;
+    let mm = tessellation.displacement_mm;
+    let is_tessellated = tessellation.edge_px.is_some() || mm == 0.0;
+    check("displacement", mm, is_tessellated, "0 without tessellation (--tessellate)")?;
+    let usual = Effects::default();
+    let has_map = shadows.method != Shadows::None || indirect.method != Indirect::None;
+    for (size_px, usual_px) in
+        [(shadows.map_size_px, usual.shadows.map_size_px), (indirect.map_size_px, usual.indirect.map_size_px)]
+    {
+        let expected = "no such option without --shadows map or --indirect rsm";
+        check("shadow-map-size", size_px, has_map || size_px == usual_px, expected)?;
+    }
+    Ok(())
 }
 
 /// Refuses a setting's value unless it `is_taken`.
@@ -163,16 +151,17 @@ mod tests {
 
     #[test]
     fn a_specification_is_json_and_back() {
-        let spec = FrameSpec {
-            width: 64,
-            post: Post::Smaa,
-            shadows: Shadows::Map,
-            transparency: Transparency::None,
-            tessellate_px: Some(4.0),
-            ..FrameSpec::default()
-        };
+        let mut effects = Effects::default();
+        for (key, text) in
+            [("post", "smaa"), ("shadow-map-size", "512"), ("transparency", "none"), ("tessellate", "4")]
+        {
+            effects.set(key, text).expect("a value");
+        }
+        let spec = FrameSpec { width: 64, effects, ..FrameSpec::default() };
         let text = serde_json::to_string(&spec).expect("is JSON");
-        assert!(text.contains(r#""post":"smaa""#) && text.contains(r#""transparency":"none""#), "{text}");
+        let expected =
+            r#""effects":{"post":"smaa","shadow-map-size":512,"tessellate":4,"transparency":"none"}"#;
+        assert!(text.contains(expected), "{text}");
         assert_eq!(serde_json::from_str::<FrameSpec>(&text).expect("reads"), spec);
         assert_eq!(serde_json::from_str::<FrameSpec>("{}").expect("reads"), FrameSpec::default());
     }
@@ -182,8 +171,10 @@ mod tests {
         let told = |text: &str| serde_json::from_str::<FrameSpec>(text).expect_err("is refused").to_string();
         let line = told(r#"{"widht": 3}"#);
         assert!(line.contains("widht") && line.contains("`width`"), "{line}");
-        let line = told(r#"{"shadows": "pcss"}"#);
+        let line = told(r#"{"effects": {"shadows": "pcss"}}"#);
         assert!(line.contains("pcss") && line.contains("none, map"), "{line}");
+        let line = told(r#"{"effects": {"fog": true}}"#);
+        assert!(line.contains("fog") && line.contains("shadow-map-size"), "{line}");
     }
 
     #[test]
@@ -198,10 +189,13 @@ mod tests {
         assert!(refused(|spec| spec.samples = 3).contains("1, 2, 4, 8 or 16"));
         assert!(refused(|spec| spec.lights = LIGHTS_MAX + 1).starts_with("lights"));
         assert!(refused(|spec| spec.time_s = Some(f64::NAN)).starts_with("time"));
-        assert!(refused(|spec| spec.tessellate_px = Some(0.5)).contains("from 1 to 64"));
-        assert!(refused(|spec| spec.displacement_mm = 20.0).contains("without tessellation"));
-        assert!(refused(|spec| spec.shadow_map_size = Some(64)).contains("--shadows map"));
-        let filtered = refused(|spec| (spec.post, spec.view) = (Post::Fxaa, "edges".to_owned()));
+        assert!(refused(|spec| spec.effects.tessellation.edge_px = Some(0.5)).contains("from 1 to 64"));
+        assert!(
+            refused(|spec| spec.effects.tessellation.displacement_mm = 20.0).contains("without tessellation")
+        );
+        assert!(refused(|spec| spec.effects.shadows.map_size_px = 64).contains("--shadows map"));
+        let filtered =
+            refused(|spec| (spec.effects.post.filter, spec.view) = (Post::Fxaa, "edges".to_owned()));
         assert!(filtered.starts_with("post: found fxaa, expected none"), "{filtered}");
     }
 }

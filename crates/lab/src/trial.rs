@@ -8,7 +8,7 @@ use afterlight_graph::{FrameReport, Plan, PlannedPass, Traffic};
 use afterlight_image::{Rgba8Image, RgbaF32Image};
 use afterlight_measure::{Buffer, CostRecord, Memory, Pass, RunResult, Spread, Status};
 use afterlight_techniques::cost::Workload;
-use afterlight_techniques::{Counter, Params, Prepared, Renderer, TechniqueError};
+use afterlight_techniques::{Counter, Prepared, Renderer, TechniqueError};
 use serde_json::Value;
 
 use crate::Chosen;
@@ -252,7 +252,7 @@ impl Trial {
 
 /// Every parameter with its value, numbers as numbers.
 fn params_record(chosen: &Chosen) -> BTreeMap<String, Value> {
-    let resolved = Params::resolved(&chosen.params, chosen.technique.info());
+    let resolved = chosen.params.resolved();
     resolved
         .into_iter()
         .map(|(key, value)| {

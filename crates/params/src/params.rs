@@ -39,6 +39,22 @@ impl Params {
         self
     }
 
+    /// The sets of `defaults`, each as it is here where there is one of its type: what is left open gets its default, what
+    /// `defaults` does not have is left out.
+    #[must_use]
+    pub fn over(&self, defaults: Params) -> Params {
+        let type_of = |set: &dyn ParamSet| set.as_any().type_id();
+        let here = |wanted: &dyn ParamSet| {
+            self.sets.iter().find(|set| type_of(set.as_ref()) == type_of(wanted)).map(|set| set.clone_box())
+        };
+        Self { sets: defaults.sets.into_iter().map(|set| here(set.as_ref()).unwrap_or(set)).collect() }
+    }
+
+    /// Whether there is a set of that type, embedded in another or not.
+    pub fn holds<T: ParamSet>(&self) -> bool {
+        self.find::<T>().is_some()
+    }
+
     /// The set of that type, or the first one embedded in another.
     pub fn find<T: ParamSet>(&self) -> Option<&T> {
         self.sets.iter().find_map(|set| set.part(TypeId::of::<T>()))?.downcast_ref()

@@ -10,14 +10,12 @@ use afterlight_scene::Scene;
 use afterlight_shader::{Shader, structs::FrameConstants};
 
 use afterlight_frame::{
-    Board, CameraView, Frame, LightPairs, MAX_DISPLACEMENT_M, MIN_TESSELLATE_PX, Params, SceneBuffers,
-    SceneLights, Settings, Technique, TechniqueError,
+    Board, CameraView, Cull, DrawParams, Frame, LightPairs, MAX_DISPLACEMENT_MM, MIN_TESSELLATE_PX, Params,
+    SceneBuffers, SceneLights, Settings, Technique, TechniqueError, TessellationEffect,
     camera_view::background_radiance,
     capacity::{self, Capacities, Counter, Demand},
-    scene::{
-        SceneGpu,
-        draw_list::{DrawList, DrawOptions, DrawOrder},
-    },
+    completed,
+    scene::{SceneGpu, draw_list::DrawList},
     upload::upload_slice,
     views,
 };
@@ -28,7 +26,7 @@ use afterlight_stages::{
     },
     lights::volumes,
     shared::{indirect, shadow},
-    views::light_pair_colors,
+    views::{light_pair_colors, of as technique_views},
 };
 
 /// Times that a view is recorded at most until everything that can overflow has room.
@@ -140,22 +138,21 @@ impl Renderer {
         params: &Params,
         also: impl Fn(&mut Graph, &ImageHandle),
     ) -> Result<Prepared, TechniqueError> {
-        let info = technique.info();
         self.check(technique)?;
         self.check_tessellation(technique)?;
-        let options = DrawOptions {
-            cull: params.text(info, "cull") == "frustum",
-            order: match params.text(info, "order") {
-                "near" => DrawOrder::Near,
-                "scene" => DrawOrder::Scene,
-                _ => DrawOrder::Center,
-            },
-        };
+        let params = &completed(technique, params);
+        let options = *params.typed::<DrawParams>();
         let settings = &self.settings;
         let view = CameraView::new(settings);
         let mut draws = DrawList::new(&self.device, &self.scene, options)?;
-        draws.update(&self.scene, view.clip_from_world, view.eye_ws, settings.displacement_m)?;
-        let blended = BlendedList::of_view(&self.device, &self.scene, settings, &view, options.cull)?;
+        draws.update(
+            &self.scene,
+            view.clip_from_world,
+            view.eye_ws,
+            settings.effects.tessellation.displacement_m(),
+        )?;
+        let blended =
+            BlendedList::of_view(&self.device, &self.scene, settings, &view, options.cull == Cull::Frustum)?;
         let draws = (&draws, blended.as_ref());
         let constants = self.device.create_buffer(&gpu::BufferDesc {
             name: "frame constants",
@@ -206,7 +203,7 @@ impl Renderer {
             });
         }
         let view = &self.settings.view;
-        let known = [&[views::FINAL], &views::of(technique)[..]].concat();
+        let known = [&[views::FINAL], &technique_views(technique)[..]].concat();
         if !known.contains(&view.as_str()) {
             return Err(TechniqueError::UnknownView {
                 technique: info.id,
@@ -220,16 +217,16 @@ impl Renderer {
     /// Checks what is asked of tessellation.
     fn check_tessellation(&self, technique: &dyn Technique) -> Result<(), TechniqueError> {
         let info = technique.info();
-        let Settings { tessellate_px, displacement_m, .. } = self.settings;
+        let TessellationEffect { edge_px, displacement_mm } = self.settings.effects.tessellation;
         let conflict = |found: String, expected: String| {
             Err(TechniqueError::Conflict { technique: info.id, found, expected })
         };
-        if !(0.0..=MAX_DISPLACEMENT_M).contains(&displacement_m) {
-            let expected = format!("from 0 to {MAX_DISPLACEMENT_M} m");
-            return conflict(format!("a displacement of {displacement_m} m"), expected);
+        if !(0.0..=MAX_DISPLACEMENT_MM).contains(&displacement_mm) {
+            let expected = format!("from 0 to {MAX_DISPLACEMENT_MM} mm");
+            return conflict(format!("a displacement of {displacement_mm} mm"), expected);
         }
-        let Some(px) = tessellate_px else {
-            return match displacement_m > 0.0 {
+        let Some(px) = edge_px else {
+            return match displacement_mm > 0.0 {
                 true => conflict("displacement alone".to_owned(), "tessellation with it".to_owned()),
                 false => Ok(()),
             };
@@ -272,8 +269,8 @@ impl Renderer {
             clip_from_world: view.clip_from_world,
             background_radiance: background_radiance(settings).into(),
             view: &settings.view,
-            tessellate_px: settings.tessellate_px,
-            displacement_m: settings.displacement_m,
+            tessellate_px: settings.effects.tessellation.edge_px,
+            displacement_m: settings.effects.tessellation.displacement_m(),
             buffers: self.import(&mut graph, constants, draws),
             shaders: &[&self.extra_shaders, technique.shaders(), &afterlight_stages::SHADERS],
             device: &self.device,
@@ -294,7 +291,8 @@ impl Renderer {
             true => light_pair_colors(&mut graph, &frame, &hdr)?,
             false => hdr,
         };
-        let final_color = post::finish(&self.device, &mut graph, &frame, &shown, settings.post)?;
+        let final_color =
+            post::finish(&self.device, &mut graph, &frame, &shown, settings.effects.post.filter)?;
         let final_id = graph.keep(&final_color);
         let plan = graph.plan(&self.device)?;
         let executor = Executor::new(&self.device, plan)?;
@@ -351,8 +349,8 @@ fn check_size(device: &gpu::Device, settings: &Settings) -> Result<(), Technique
     for (what, found) in [
         ("image width in pixels", settings.width_px),
         ("image height in pixels", settings.height_px),
-        ("reflective shadow map size in pixels", settings.rsm_size_px),
-        ("shadow map size in pixels", settings.shadow_map_size_px),
+        ("reflective shadow map size in pixels", settings.effects.indirect.map_size_px),
+        ("shadow map size in pixels", settings.effects.shadows.map_size_px),
     ] {
         if u64::from(found) > limit || found == 0 {
             return Err(TechniqueError::TooLarge { what: what.to_owned(), found: found.into(), limit });

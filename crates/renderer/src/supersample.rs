@@ -6,7 +6,7 @@ use afterlight_graph::gpu;
 use half::f16;
 
 use crate::Renderer;
-use afterlight_frame::{Post, Settings, Technique, TechniqueError, params::Params, scene::SceneGpu, views};
+use afterlight_frame::{Params, Post, Settings, Technique, TechniqueError, scene::SceneGpu, views};
 use afterlight_stages::compose::present;
 
 /// Renders a technique at `factor` times the settings' width and height, one sample a pixel, averages the linear radiance
@@ -31,12 +31,14 @@ pub fn reference_rgba8(
         height_px,
         samples: 1,
         keep_hdr: true,
-        post: Post::None,
         view: views::FINAL.to_owned(),
-        // The same triangles: edges of the large image are as much longer.
-        tessellate_px: settings.tessellate_px.map(|px| px * factor as f32),
         ..settings.clone()
-    };
+    }
+    .with_effects(|effects| {
+        effects.post.filter = Post::None;
+        // The same triangles: edges of the large image are as much longer.
+        effects.tessellation.edge_px = effects.tessellation.edge_px.map(|px| px * factor as f32);
+    });
     let renderer = Renderer::with_scene(device, Arc::clone(scene), &large)?;
     let mut prepared = renderer.prepare(technique, &Params::default())?;
     prepared.run()?;

@@ -18,9 +18,10 @@
 
 pub use afterlight_cost as cost;
 pub use afterlight_frame::{
-    ANY_SAMPLES, Answers, AppendixA, Board, Counter, DrawOptions, DrawOrder, Exactness, Frame, Indirect,
-    Info, LightPairs, MULTIPLE_SAMPLES, Need, ParamInfo, ParamKind, Params, Post, SceneGpu, SceneLights,
-    Settings, Shadows, Source, Technique, TechniqueError, Transparency, device_order, views,
+    ANY_SAMPLES, Answers, AppendixA, Board, Counter, Cull, DrawOrder, DrawParams, Effects, Exactness, Frame,
+    Indirect, Info, LightPairs, MULTIPLE_SAMPLES, Need, ParamError, ParamInfo, ParamKind, ParamSet, Params,
+    Post, SceneGpu, SceneLights, Settings, Shadows, Source, Technique, TechniqueError, Transparency,
+    completed, device_order, params, params_of, set_param, views,
 };
 pub use afterlight_graph as graph;
 pub use afterlight_renderer::{Prepared, Renderer, supersample};
@@ -32,7 +33,7 @@ pub use afterlight_stages as stages;
 /// Debug views.
 pub mod view {
     pub use afterlight_frame::views::*;
-    pub use afterlight_stages::views::{ATTRIBUTE_ERRORS, RECORD_SAMPLES};
+    pub use afterlight_stages::views::{ATTRIBUTE_ERRORS, RECORD_SAMPLES, of};
 }
 pub use afterlight_stages::{
     compose::post,
@@ -41,7 +42,7 @@ pub use afterlight_stages::{
 };
 /// Limits of tessellation.
 pub mod geometry {
-    pub use afterlight_frame::{MAX_DISPLACEMENT_M, MAX_TESSELLATE_PX, MIN_TESSELLATE_PX};
+    pub use afterlight_frame::{MAX_DISPLACEMENT_MM, MAX_TESSELLATE_PX, MIN_TESSELLATE_PX};
 }
 
 include!(concat!(env!("OUT_DIR"), "/registry.rs"));

@@ -10,7 +10,7 @@ use afterlight_oracle::{
     tiles::{Decision, light_reaches},
 };
 use afterlight_stages::{
-    lights::cells::{self, Division, Grid, VisibleDepths},
+    lights::cells::{self, ClusterParams, Division, Slicing, TileParams, VisibleDepths},
     surfaces::gbuffer,
 };
 use afterlight_techniques::{
@@ -81,7 +81,7 @@ struct Found {
 /// Slices of a tile, and whether they end at equal ratios.
 fn slices(division: Division) -> (u32, bool) {
     match division {
-        Division::Clusters(grid) => (grid.slices, grid.logarithmic),
+        Division::Clusters(grid) => (grid.slices, grid.slicing == Slicing::Logarithmic),
         _ => (1, false),
     }
 }
@@ -223,7 +223,7 @@ impl Found {
 
     /// Checks that a tile's steps are those that hold a surface.
     fn check_steps(&self, tile: u32, cell: &Cell) {
-        if !matches!(self.division, Division::Tiles25d { .. }) {
+        if !matches!(self.division, Division::Tiles25d(_)) {
             assert_eq!(cell.steps, u32::MAX);
             return;
         }
@@ -249,7 +249,8 @@ impl Found {
 }
 
 const fn grid(cluster_px: u32, slices: u32, logarithmic: bool) -> Division {
-    Division::Clusters(Grid { cluster_px, slices, logarithmic })
+    let slicing = if logarithmic { Slicing::Logarithmic } else { Slicing::Uniform };
+    Division::Clusters(ClusterParams { cluster_px, slices, slicing })
 }
 
 const DIVISIONS: [Division; 6] = [
@@ -257,8 +258,8 @@ const DIVISIONS: [Division; 6] = [
     grid(17, 7, false),
     grid(8, 256, true),
     grid(64, 1, false),
-    Division::Tiles { tile_px: 16 },
-    Division::Tiles25d { tile_px: 16 },
+    Division::Tiles(TileParams { tile_px: 16 }),
+    Division::Tiles25d(TileParams { tile_px: 16 }),
 ];
 
 /// Settings whose lights are in the order of the device.

@@ -4,7 +4,7 @@ mod common;
 
 use afterlight_image::Rgba8Image;
 use afterlight_techniques::{
-    Indirect, Params, Settings, Shadows, find,
+    Indirect, Settings, Shadows, find, params_of,
     scene::{self, Scene},
     shader::Shader,
 };
@@ -70,8 +70,10 @@ fn every_mixture_is_one_image() {
 fn under_shadows_and_indirect_light() {
     let gpu = afterlight_testkit::gpu();
     let stage = Stage::new(&gpu, "builtin:colonnade?triangles=30000");
-    let settings =
-        Settings { shadows: Shadows::Map, indirect: Indirect::Rsm, ..stage.settings((160, 90), 0) };
+    let settings = stage.settings((160, 90), 0).with_effects(|effects| {
+        effects.shadows.method = Shadows::Map;
+        effects.indirect.method = Indirect::Rsm;
+    });
     let reference = stage.image(find("forward").unwrap(), &settings);
     for weight in ["0.5", "1"] {
         let (image, share) = rendered(&stage, &settings, &[("prepass-weight", weight)], None);
@@ -147,8 +149,8 @@ fn of_equal_depths_the_first_drawn_is_seen() {
 
 #[test]
 fn parameters_out_of_range_are_refused() {
-    let info = find("hybrid").unwrap().info();
+    let hybrid = find("hybrid").unwrap();
     for (key, value) in [("path", "forward"), ("prepass-weight", "-1"), ("prepass-weight", "NaN")] {
-        assert!(Params::default().set(info, key, value).is_err(), "{key}={value}");
+        assert!(params_of(hybrid).set(key, value).is_err(), "{key}={value}");
     }
 }

@@ -42,7 +42,7 @@ fn show_indirect_light(name: &str, stage: &Stage, plain: &Settings) {
 }
 
 fn with_rsm(settings: Settings) -> Settings {
-    Settings { indirect: Indirect::Rsm, ..settings }
+    settings.with_effects(|effects| effects.indirect.method = Indirect::Rsm)
 }
 
 /// The light of each kind, above the scene's bounds and to the side.
@@ -58,13 +58,13 @@ fn errors(stage: &Stage, light: Light, patterns: &[Pattern]) -> Vec<f64> {
     let mut plain = stage.settings((size[0], size[1]), 0);
     plain.lights = vec![light];
     plain.environment.ambient_radiance = Vec3::ZERO;
-    plain.rsm_size_px = 64;
+    plain.effects.indirect.map_size_px = 64;
     let forward = find("forward").unwrap();
     let without = stage.radiance(forward, &plain);
     let with = stage.radiance(forward, &with_rsm(plain.clone()));
     let rays = RayScene::new(&stage.scene);
     let source = SourceView::choose(&plain.lights, &stage.scene.bounds_ws()).expect("a light");
-    let map = Rsm::new(&rays, &source.light, &source.camera, plain.rsm_size_px);
+    let map = Rsm::new(&rays, &source.light, &source.camera, plain.effects.indirect.map_size_px);
     let mut sums = vec![[0.0; 2]; patterns.len()];
     let mut lit = 0;
     for (i, (with, without)) in with.iter().zip(&without).enumerate() {
@@ -129,9 +129,11 @@ fn report_of_shared(prepared: &mut Prepared) -> Vec<String> {
 fn every_technique_has_the_same_indirect_light() {
     let gpu = afterlight_testkit::gpu();
     let stage = Stage::new(&gpu, "builtin:colonnade?triangles=30000");
-    let plain = Settings { rsm_size_px: 256, ..stage.settings((160, 90), 0) };
+    let plain = stage.settings((160, 90), 0).with_effects(|effects| effects.indirect.map_size_px = 256);
     for camera in &stage.scene.cameras[..4] {
-        let large = Settings { rsm_size_px: 512, ..stage.from(camera.clone(), (480, 270), 0) };
+        let large = stage
+            .from(camera.clone(), (480, 270), 0)
+            .with_effects(|effects| effects.indirect.map_size_px = 512);
         show_indirect_light(&format!("indirect-{}", camera.name), &stage, &large);
     }
     for samples in [1, 4] {
@@ -171,7 +173,7 @@ fn the_lights_view_is_shared_memory() {
         let mut prepared = stage.prepare(find("deferred").unwrap(), settings);
         prepared.executor().plan().technique_bytes()
     };
-    let large = with_rsm(Settings { rsm_size_px: 1024, ..plain.clone() });
+    let large = with_rsm(plain.clone().with_effects(|effects| effects.indirect.map_size_px = 1024));
     assert_eq!(bytes(&plain), bytes(&large));
 }
 
@@ -190,8 +192,11 @@ fn without_a_light_it_is_told() {
     assert_eq!(stage.image(forward, &dark).pixels, stage.image(forward, &with_rsm(dark.clone())).pixels);
     let lit = with_rsm(stage.settings((64, 36), 0));
     assert!(warnings(&lit).is_empty());
-    let mut prepared =
-        stage.try_prepare(forward, &Settings { rsm_size_px: u32::MAX, ..lit }, &Params::default());
+    let mut prepared = stage.try_prepare(
+        forward,
+        &lit.with_effects(|effects| effects.indirect.map_size_px = u32::MAX),
+        &Params::default(),
+    );
     let error = prepared.as_mut().err().map(|e| e.to_string()).expect("no device has that");
     assert!(error.contains("reflective shadow map size"), "{error}");
 }

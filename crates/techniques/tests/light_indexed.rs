@@ -5,7 +5,7 @@ mod common;
 use afterlight_image::Rgba8Image;
 use afterlight_oracle::raster::{RayScene, pixel_ray};
 use afterlight_techniques::{
-    Exactness, Params, Settings, find,
+    Exactness, Params, Settings, find, params_of,
     scene::{Light, LightKind},
     shader::Shader,
 };
@@ -196,7 +196,7 @@ fn widths_of_an_index_agree_or_are_refused() {
 }
 
 fn params_refused(technique: &dyn afterlight_techniques::Technique) -> bool {
-    Params::default().set(technique.info(), "index-parts", "5").is_err()
+    params_of(technique).set("index-parts", "5").is_err()
 }
 
 /// The bound that the techniques state: what is lost at 1, 100 and 10,000 lights of which about eight meet.

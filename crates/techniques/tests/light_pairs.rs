@@ -298,7 +298,7 @@ fn a_technique_that_cannot_count_does_not_list_the_views() {
     let settings = counting(&stage.settings((8, 8), 1), views::LIGHT_ERROR);
     let error = stage.try_prepare(&NoSum, &settings, &Params::default()).err().expect("is refused");
     assert!(!error.to_string().contains(views::LIGHT_COUNT), "{error}");
-    assert!(views::of(find("forward").unwrap()).contains(&views::LIGHT_COUNT));
+    assert!(afterlight_stages::views::of(find("forward").unwrap()).contains(&views::LIGHT_COUNT));
     // Without a view of pairs there are none.
     let mut prepared = stage.prepare(find("forward").unwrap(), &stage.settings((8, 8), 1));
     prepared.run().unwrap_or_else(|e| panic!("{e}"));

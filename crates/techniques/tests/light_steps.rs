@@ -3,7 +3,7 @@
 mod common;
 
 use afterlight_techniques::{
-    Params, Settings, Technique, find, registry,
+    Settings, Technique, find, registry,
     scene::{Light, LightKind},
     shader::Shader,
 };
@@ -26,10 +26,8 @@ fn settings(stage: &Stage, samples: u32) -> Settings {
 
 /// The ways that a technique has, apart from those it chooses by itself.
 fn ways(technique: &dyn Technique) -> Vec<&'static str> {
-    let all = Params::known(technique.info()).find(|p| p.key == "lights");
-    let Some(afterlight_techniques::ParamKind::Choice { values }) = all.map(|p| p.kind) else {
-        return Vec::new();
-    };
+    let all = technique.params().infos().into_iter().find(|param| param.key == "lights");
+    let values = all.map_or(&[][..], |param| param.kind.names());
     values.iter().copied().filter(|value| !["auto", "all"].contains(value)).collect()
 }
 
@@ -76,7 +74,10 @@ fn every_way_gives_the_image_of_all_lights() {
 fn tessellated_surfaces_find_their_lights() {
     let gpu = afterlight_testkit::gpu();
     let stage = Stage::new(&gpu, "builtin:colonnade?triangles=17000&texture=64");
-    let tessellated = Settings { tessellate_px: Some(16.0), displacement_m: 0.02, ..settings(&stage, 4) };
+    let tessellated = settings(&stage, 4).with_effects(|effects| {
+        effects.tessellation.edge_px = Some(16.0);
+        effects.tessellation.displacement_mm = 1e3 * 0.02;
+    });
     for id in ["dais", "dais-list"] {
         agree(find(id).unwrap(), &stage, &tessellated);
     }

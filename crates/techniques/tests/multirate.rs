@@ -95,8 +95,9 @@ fn low_rates_against_full_rate() {
     for source in ["builtin:colonnade?triangles=17000&texture=64", "builtin:intersect"] {
         let stage = Stage::new(&gpu, source);
         for samples in counts(&gpu) {
-            let plain = Settings { samples, shadow_map_size_px: 256, ..stage.settings((97, 55), 0) };
-            let settings = Settings { indirect: Indirect::Rsm, ..plain.clone() };
+            let plain = Settings { samples, ..stage.settings((97, 55), 0) }
+                .with_effects(|effects| effects.shadows.map_size_px = 256);
+            let settings = plain.clone().with_effects(|effects| effects.indirect.method = Indirect::Rsm);
             let reference =
                 |(id, sets)| [&settings, &plain].map(|settings| radiance(&stage, settings, id, sets, 1));
             let mut known: Vec<(Full, [Radiance; 2])> = Vec::new();
@@ -131,7 +132,8 @@ fn without_indirect_light_it_is_dais() {
 fn quads_have_one_rate() {
     let gpu = afterlight_testkit::gpu();
     let stage = Stage::new(&gpu, "builtin:intersect");
-    let settings = Settings { indirect: Indirect::Rsm, ..stage.settings((64, 36), 3) };
+    let settings =
+        stage.settings((64, 36), 3).with_effects(|effects| effects.indirect.method = Indirect::Rsm);
     let technique = find("dais-multirate").unwrap();
     let params = params(technique, &[("share", "quads"), ("rate", "1/4")]);
     let error =

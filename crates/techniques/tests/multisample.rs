@@ -2,6 +2,7 @@
 
 mod common;
 
+use afterlight_stages::lights::step::asked;
 use afterlight_techniques::{
     Params, Settings, Technique, Transparency, find, graph::gpu, registry, scene::Camera,
 };
@@ -37,7 +38,7 @@ fn variants() -> Vec<(&'static dyn Technique, Params, String)> {
     let mut all = Vec::new();
     for technique in registry().iter().copied().filter(|t| t.info().samples.contains(&4)) {
         let info = technique.info();
-        let lights: &[&[(&str, &str)]] = match info.params.iter().any(|p| p.key == "lights") {
+        let lights: &[&[(&str, &str)]] = match asked(&technique.params()).is_some() {
             true => &[&[("lights", "all")], &[("lights", "clusters")]],
             false => &[&[]],
         };
@@ -183,7 +184,9 @@ fn without_dynamic_blocks_it_is_the_image_of_one_sample() {
     let gpu = afterlight_testkit::gpu();
     let stage = Stage::new(&gpu, "builtin:colonnade?triangles=30000");
     // Blended surfaces are drawn over it at all samples.
-    let settings = Settings { transparency: Transparency::None, ..stage.settings((320, 180), 100) };
+    let settings = stage
+        .settings((320, 180), 100)
+        .with_effects(|effects| effects.transparency.order = Transparency::None);
     let one = stage.image(find("forward").unwrap(), &settings);
     for samples in std::iter::once(1).chain(counts(&gpu)) {
         let db =

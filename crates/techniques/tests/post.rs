@@ -22,7 +22,8 @@ fn supersampled(stage: &Stage, settings: &Settings) -> Rgba8Image {
 }
 
 fn filtered(stage: &Stage, settings: &Settings, post: Post) -> Rgba8Image {
-    stage.image(find("forward").unwrap(), &Settings { post, ..settings.clone() })
+    stage
+        .image(find("forward").unwrap(), &settings.clone().with_effects(|effects| effects.post.filter = post))
 }
 
 /// Writes an image for the eye where `AFTERLIGHT_POST_IMAGES` names a folder.
@@ -77,7 +78,7 @@ fn exchanged_weights_are_caught() {
     let gpu = afterlight_testkit::gpu();
     for scene in ["builtin:edge", "builtin:intersect", "builtin:spheres?segments=48"] {
         let stage = Stage::new(&gpu, scene);
-        let settings = Settings { post: Post::Smaa, ..stage.settings((160, 90), 0) };
+        let settings = stage.settings((160, 90), 0).with_effects(|effects| effects.post.filter = Post::Smaa);
         let reference = supersampled(&stage, &settings);
         let mut renderer = Renderer::with_scene(&stage.device, stage.uploaded.clone(), &settings).unwrap();
         let swapped =
@@ -144,7 +145,10 @@ fn every_technique_takes_every_filter() {
     };
     for post in FILTERS {
         for size_px in [(80, 45), (1, 1), (17, 3)] {
-            let [one, four] = [1, 4].map(|samples| Settings { post, samples, ..stage.settings(size_px, 10) });
+            let [one, four] = [1, 4].map(|samples| {
+                Settings { samples, ..stage.settings(size_px, 10) }
+                    .with_effects(|effects| effects.post.filter = post)
+            });
             let references = [&one, &four].map(|settings| filtered(&stage, settings, post));
             for technique in registry() {
                 let id = technique.info().id;
@@ -168,7 +172,7 @@ fn every_technique_takes_every_filter() {
                 let bound_db = match is_multisampled {
                     false => min_psnr_db,
                     true => {
-                        let plain = Settings { post: Post::None, ..settings.clone() };
+                        let plain = settings.clone().with_effects(|effects| effects.post.filter = Post::None);
                         let forward = filtered(&stage, &plain, Post::None);
                         psnr(&forward, &stage.image(*technique, &plain)).min(min_psnr_db) - 6.0
                     }

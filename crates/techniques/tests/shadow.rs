@@ -25,7 +25,7 @@ fn show(name: &str, image: &Rgba8Image) {
 }
 
 fn with_shadows(settings: Settings) -> Settings {
-    Settings { shadows: Shadows::Map, ..settings }
+    settings.with_effects(|effects| effects.shadows.method = Shadows::Map)
 }
 
 /// The light of each kind, above the scene and to the side.
@@ -62,7 +62,7 @@ fn probes(stage: &Stage, settings: &Settings) -> Vec<Probe> {
         let hit = rays.first_hit(&pixel_ray(&settings.camera, [i % SIZE[0], i / SIZE[0]], SIZE))?;
         let position_ws = rays.attributes(&hit).position_ws;
         let normal_ws = rays.plane_normal_ws(&hit);
-        let size_px = settings.shadow_map_size_px;
+        let size_px = settings.effects.shadows.map_size_px;
         (hit.edge_distance > 0.02).then(|| Probe {
             pixel: i as usize,
             lit: shadows.reaches(position_ws),
@@ -161,18 +161,17 @@ fn forward_has_the_shadows_that_rays_have() {
 }
 
 fn has_the_shadows_that_rays_have(stage: &Stage, case: &Case, light: Light) {
-    let plain = Settings {
-        lights: vec![light],
-        shadow_map_size_px: case.map_size_px,
-        // Rays end at opaque surfaces.
-        transparency: Transparency::None,
-        ..stage.settings((SIZE[0], SIZE[1]), 0)
-    };
+    let plain =
+        Settings { lights: vec![light], ..stage.settings((SIZE[0], SIZE[1]), 0) }.with_effects(|effects| {
+            effects.shadows.map_size_px = case.map_size_px;
+            // Rays end at opaque surfaces.
+            effects.transparency.order = Transparency::None;
+        });
     let probes = probes(stage, &plain);
     let without = radiance(stage, &plain, None);
     let none = radiance(stage, &Settings { lights: Vec::new(), ..plain.clone() }, None);
     let found = |shadow_bias: f32, shader: Option<&Shader>| {
-        let settings = with_shadows(Settings { shadow_bias, ..plain.clone() });
+        let settings = with_shadows(plain.clone().with_effects(|effects| effects.shadows.bias = shadow_bias));
         shares(&probes, &radiance(stage, &settings, shader), &without, &none)
     };
     let what = format!("{} {:?}", case.source, light.kind);
@@ -213,7 +212,8 @@ fn all_agree(stage: &Stage, settings: &Settings, what: &str, kind: impl Fn(&dyn 
     let forward = find("forward").unwrap();
     let samples = settings.samples;
     let reference = stage.image(forward, settings);
-    let off = stage.image(forward, &Settings { shadows: Shadows::None, ..settings.clone() });
+    let off = stage
+        .image(forward, &settings.clone().with_effects(|effects| effects.shadows.method = Shadows::None));
     show(&format!("{what}-forward-{samples}"), &reference);
     let change_db = psnr(&reference, &off);
     println!("{what}, {samples} samples: without {change_db:.2} dB");
@@ -237,8 +237,11 @@ fn all_agree(stage: &Stage, settings: &Settings, what: &str, kind: impl Fn(&dyn 
 /// Settings at a number of samples. What shades samples at their own places has the edges of shadows at them, where `forward` has
 /// them at pixels' centres: at several samples edges are as wide as pixels, for the two to be one image.
 fn at_samples(settings: Settings, samples: u32) -> Settings {
-    let shadow_map_size_px = if samples == 1 { settings.shadow_map_size_px } else { 256 };
-    with_shadows(Settings { samples, shadow_map_size_px, ..settings })
+    let shadow_map_size_px = if samples == 1 { settings.effects.shadows.map_size_px } else { 256 };
+    with_shadows(
+        Settings { samples, ..settings }
+            .with_effects(|effects| effects.shadows.map_size_px = shadow_map_size_px),
+    )
 }
 
 #[test]
@@ -279,8 +282,10 @@ fn tessellated_surfaces_have_the_same_shadows() {
         return;
     }
     let stage = Stage::new(&gpu, "builtin:colonnade?triangles=30000");
-    let tessellated =
-        Settings { tessellate_px: Some(8.0), displacement_m: 0.05, ..stage.settings((320, 180), 0) };
+    let tessellated = stage.settings((320, 180), 0).with_effects(|effects| {
+        effects.tessellation.edge_px = Some(8.0);
+        effects.tessellation.displacement_mm = 1e3 * 0.05;
+    });
     for samples in [1, 4] {
         let settings = at_samples(tessellated.clone(), samples);
         all_agree(&stage, &settings, "tessellated", |t| t.info().tessellation);
@@ -297,9 +302,9 @@ fn the_shadow_map_is_shared_memory() {
         let mut prepared = stage.prepare(find("deferred").unwrap(), settings);
         prepared.executor().plan().technique_bytes()
     };
-    let large = with_shadows(Settings { shadow_map_size_px: 1024, ..plain.clone() });
+    let large = with_shadows(plain.clone().with_effects(|effects| effects.shadows.map_size_px = 1024));
     assert_eq!(bytes(&plain), bytes(&large));
-    let both = with_shadows(Settings { indirect: Indirect::Rsm, ..plain });
+    let both = with_shadows(plain.with_effects(|effects| effects.indirect.method = Indirect::Rsm));
     let mut prepared = stage.prepare(find("tiled").unwrap(), &both);
     assert_eq!(shared_passes(&mut prepared), ["shared/rsm", "shared/shadow"]);
 }
@@ -321,7 +326,7 @@ fn without_a_light_it_is_told() {
     let lit = with_shadows(stage.settings((64, 36), 0));
     assert!(warnings(&lit).is_empty());
     for wrong in [0, u32::MAX] {
-        let settings = Settings { shadow_map_size_px: wrong, ..lit.clone() };
+        let settings = lit.clone().with_effects(|effects| effects.shadows.map_size_px = wrong);
         let refused = stage.try_prepare(forward, &settings, &Params::default());
         let error = refused.err().map(|e| e.to_string()).expect("no device has that");
         assert!(error.contains("shadow map size"), "{error}");

@@ -3,10 +3,10 @@
 
 mod common;
 
-use afterlight_frame::MAX_DISPLACEMENT_M;
+use afterlight_frame::MAX_DISPLACEMENT_MM;
 use afterlight_image::Rgba8Image;
 use afterlight_techniques::{
-    Exactness, Indirect, Params, Settings, Technique, TechniqueError, find,
+    Exactness, Indirect, Settings, Technique, TechniqueError, find,
     graph::gpu,
     registry,
     scene::{Camera, Scene},
@@ -26,7 +26,10 @@ fn tessellating() -> impl Iterator<Item = (&'static dyn Technique, u32)> {
 
 /// Settings at a technique's sample count, tessellated.
 fn tessellated(settings: &Settings, samples: u32, edge_px: f32, displacement_m: f32) -> Settings {
-    Settings { samples, tessellate_px: Some(edge_px), displacement_m, ..settings.clone() }
+    Settings { samples, ..settings.clone() }.with_effects(|effects| {
+        effects.tessellation.edge_px = Some(edge_px);
+        effects.tessellation.displacement_mm = 1e3 * displacement_m;
+    })
 }
 
 /// Whether the device has what tessellation takes, besides what all need.
@@ -144,8 +147,8 @@ fn what_cannot_says_so() {
     }
     let forward = find("forward").unwrap();
     for wrong in [
-        Settings { displacement_m: 0.01, ..settings.clone() },
-        tessellated(&settings, 1, 8.0, 2.0 * MAX_DISPLACEMENT_M),
+        settings.clone().with_effects(|effects| effects.tessellation.displacement_mm = 1e3 * 0.01),
+        tessellated(&settings, 1, 8.0, 2e-3 * MAX_DISPLACEMENT_MM),
         tessellated(&settings, 1, 8.0, f32::NAN),
         tessellated(&settings, 1, 0.0, 0.0),
         tessellated(&settings, 1, f32::NAN, 0.0),
@@ -225,7 +228,7 @@ fn no_crack_opens() {
         let stage = Stage::of(&gpu, scene);
         for (view, settings) in inside_views(&stage).iter().enumerate() {
             for (edge_px, displacement_m) in
-                [(64.0, 0.0), (7.0, 0.0), (13.0, 0.03), (3.0, MAX_DISPLACEMENT_M)]
+                [(64.0, 0.0), (7.0, 0.0), (13.0, 0.03), (3.0, 1e-3 * MAX_DISPLACEMENT_MM)]
             {
                 for technique in
                     ["forward", "deferred-dedup", "dais", "dais-list"].map(|id| find(id).unwrap())
@@ -335,9 +338,8 @@ fn triangles_have_the_size_asked_for() {
     let stage = Stage::new(&gpu, "builtin:sphere?segments=16");
     let away = Camera::look_at("away", Vec3::new(0.0, 0.0, 5.0), Vec3::new(0.0, 0.0, 10.0), 1.0, 0.1);
     let forward = find("forward").unwrap();
-    let mut none = Params::default();
-    none.set(forward.info(), "cull", "none").unwrap_or_else(|e| panic!("{e}"));
-    let settings = tessellated(&stage.from(away, (64, 36), 0), 1, 1.0, MAX_DISPLACEMENT_M);
+    let none = params(forward, &[("cull", "none")]);
+    let settings = tessellated(&stage.from(away, (64, 36), 0), 1, 1.0, 1e-3 * MAX_DISPLACEMENT_MM);
     let report = stage.prepare_with(forward, &settings, &none).run().unwrap_or_else(|e| panic!("{e}"));
     let statistics = report.pass("forward/shade").and_then(|pass| pass.statistics).expect("statistics");
     assert!(statistics.input_primitives > 0, "{statistics:?}");
@@ -435,7 +437,10 @@ fn tessellated_triangles_share_indirect_light() {
     let stage = Stage::new(&gpu, "builtin:colonnade?triangles=17000&texture=64");
     for samples in [1, 4] {
         let plain = tessellated(&stage.settings((97, 55), 0), samples, 12.0, 0.05);
-        let settings = Settings { shadow_map_size_px: 256, indirect: Indirect::Rsm, ..plain.clone() };
+        let settings = plain.clone().with_effects(|effects| {
+            effects.shadows.map_size_px = 256;
+            effects.indirect.method = Indirect::Rsm;
+        });
         let [dais, multirate] = ["dais", "dais-multirate"].map(|id| find(id).unwrap());
         let full = stage.image(dais, &settings);
         let without = psnr(&full, &stage.image(dais, &plain));

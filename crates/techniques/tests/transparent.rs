@@ -168,7 +168,7 @@ fn layers_have_the_value_that_is_known() {
             error = error.max(worst(&image, wall.into(), |i, _| i >= x));
             assert!(error < ROUNDING, "{what}, from behind: off by {error}");
 
-            let none = Settings { transparency: Transparency::None, ..settings };
+            let none = settings.with_effects(|effects| effects.transparency.order = Transparency::None);
             let error = worst(&stage.radiance(*technique, &none), wall.into(), |i, _| i < x);
             assert!(error < ROUNDING, "{what}: without layers off by {error}");
         }
@@ -475,7 +475,7 @@ fn every_technique_agrees_with_forward_through_the_panes_of_the_colonnade() {
     let stage = Stage::new(&gpu, "builtin:colonnade?triangles=30000&texture=128");
     for samples in [1, 4] {
         let settings = Settings { samples, ..aisle(&stage, (160, 90)) };
-        let none = Settings { transparency: Transparency::None, ..settings.clone() };
+        let none = settings.clone().with_effects(|effects| effects.transparency.order = Transparency::None);
         let forward = find("forward").unwrap();
         let (reference, without) = (stage.image(forward, &settings), stage.image(forward, &none));
         let shown = differing(&reference, &without);
@@ -518,7 +518,7 @@ fn none_is_the_scene_without_them() {
     assert!(scene.instances.len() < stage.scene.instances.len());
     let cleared = Stage::of(&gpu, scene);
     let sorted = aisle(&stage, (160, 90));
-    let none = Settings { transparency: Transparency::None, ..sorted.clone() };
+    let none = sorted.clone().with_effects(|effects| effects.transparency.order = Transparency::None);
     for id in ["forward", "deferred", "visibility"] {
         let technique = find(id).unwrap();
         let expected = cleared.image(technique, &sorted);
@@ -542,8 +542,8 @@ fn tessellated_panes_are_those_that_are_not() {
     }
     let stage = Stage::new(&gpu, "builtin:colonnade?triangles=20000&texture=64");
     let plain = aisle(&stage, (160, 90));
-    let tessellated = Settings { tessellate_px: Some(8.0), ..plain.clone() };
-    let none = Settings { transparency: Transparency::None, ..tessellated.clone() };
+    let tessellated = plain.clone().with_effects(|effects| effects.tessellation.edge_px = Some(8.0));
+    let none = tessellated.clone().with_effects(|effects| effects.transparency.order = Transparency::None);
     for id in ["forward", "deferred"] {
         let technique = find(id).unwrap();
         let image = stage.image(technique, &tessellated);
@@ -575,7 +575,12 @@ fn too_many_triangles_are_told() {
         let told = warnings(&settings);
         println!("{told:?}");
         assert_eq!(told.iter().any(|w| w.contains(&format!("{found} triangles"))), too_many);
-        assert!(warnings(&Settings { transparency: Transparency::None, ..settings.clone() }).is_empty());
+        assert!(
+            warnings(
+                &settings.clone().with_effects(|effects| effects.transparency.order = Transparency::None)
+            )
+            .is_empty()
+        );
         let image = stage.image(find("forward").unwrap(), &settings);
         assert!(common::covered(&image) > 0.05, "nothing is drawn");
     }

@@ -123,7 +123,8 @@ fn tessellated_surfaces_share_and_are_not_compared() {
     }
     let stage = Stage::new(&gpu, "builtin:edge");
     for samples in counts(&gpu) {
-        let settings = Settings { samples, tessellate_px: Some(16.0), ..stage.settings((101, 57), 0) };
+        let settings = Settings { samples, ..stage.settings((101, 57), 0) }
+            .with_effects(|effects| effects.tessellation.edge_px = Some(16.0));
         let white = stage.radiance(find("forward").unwrap(), &settings);
         let covered: f64 = white.iter().map(|p| f64::from(p[0] * samples as f32)).sum();
         for id in ["dais", "dais-list"] {

@@ -3,13 +3,13 @@
 use afterlight_image::{Rgba8Image, write_png};
 use afterlight_techniques::stages::surfaces::gbuffer;
 use afterlight_techniques::{
-    Answers, AppendixA, Exactness, Frame, Info, ParamInfo, ParamKind, Params, Renderer, Settings, Technique,
-    TechniqueError,
+    Answers, AppendixA, Exactness, Frame, Info, Params, Renderer, Settings, Technique, TechniqueError,
     cost::{Cost, Workload},
     graph::{
         Graph, ImageHandle, PassRole,
         gpu::{self, vk},
     },
+    params::parameters,
     scene,
     shader::Shader,
     tiled::cost::tiled_deferred,
@@ -19,12 +19,13 @@ include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
 
 struct Toon;
 
-static LEVELS: ParamInfo = ParamInfo {
-    key: "levels",
-    summary: "steps of brightness",
-    kind: ParamKind::Integer { min: 1, max: 64 },
-    default: "4",
-};
+parameters! {
+    /// Parameters of `toon`.
+    struct ToonParams {
+        /// steps of brightness
+        levels: u32 = 4, "levels", 1..=64;
+    }
+}
 
 static INFO: Info = Info {
     id: "toon",
@@ -42,7 +43,6 @@ static INFO: Info = Info {
         rates_decoupled: "n, n",
     },
     exactness: Exactness::Approximate { bound: "another image on purpose", min_psnr_db: 0.0 },
-    params: &[LEVELS],
     needs: &[],
     samples: &[1],
     views: &[],
@@ -56,6 +56,10 @@ impl Technique for Toon {
 
     fn shaders(&self) -> &[Shader] {
         &SHADERS
+    }
+
+    fn params(&self) -> Params {
+        Params::of(ToonParams::default())
     }
 
     fn predict(&self, workload: &Workload, _: &Params) -> Cost {
@@ -72,7 +76,7 @@ impl Technique for Toon {
         let mut pass =
             frame.compute(graph, "toon/shade", PassRole::Shading, &frame.shader("toon/toon.comp")?);
         gbuffer::bind(&mut pass, &filled);
-        pass.constant("LEVELS", frame.params.get(&LEVELS).parse::<u32>().unwrap_or(4));
+        pass.constant("LEVELS", frame.params.typed::<ToonParams>().levels);
         let radiance = pass.write("hdr", filled.accumulation);
         pass.dispatch(frame.groups(16));
         pass.finish();
@@ -89,8 +93,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
     let mut renderer = Renderer::new(&device, &scene, &settings)?;
     renderer.add_shaders(SHADERS.iter().cloned());
-    let mut params = Params::default();
-    params.set(&INFO, "levels", "3")?;
+    let params = Params::of(ToonParams { levels: 3 });
     let mut frame = renderer.prepare(&Toon, &params)?;
     let report = frame.run()?;
     write_png(file.as_ref(), &Rgba8Image { width: 320, height: 180, pixels: frame.final_rgba8()? })?;

@@ -3,7 +3,6 @@
 use afterlight_experiments::{compare_text, pictures_of};
 use afterlight_lab::{Chosen, Listener as _, Session, check_samples_of, choose, compare, failure, technique};
 use afterlight_report::{Report, Section, check_file, json_text, make_folder, write_report};
-use afterlight_techniques::Params;
 
 use crate::args::CompareArgs;
 use crate::failure::Failure;
@@ -26,7 +25,7 @@ pub fn run(args: &CompareArgs) -> Result<(), Failure> {
     super::tell_warnings(&session, &terminal);
     check_samples_of(&chosen, spec.samples)?;
 
-    let reference = Chosen { technique: reference, params: Params::default() };
+    let reference = Chosen::new(reference);
     let compared = compare(&session, &spec, &chosen, reference, args.frames, &terminal)?;
     output::json(&args.json, &compared.run)?;
     if let Some(folder) = &args.report {

@@ -32,9 +32,10 @@ pub fn run(args: &RenderArgs) -> Result<(), Failure> {
     let start = Instant::now();
     let spec = args.common.spec()?;
     let format = format_of(&args.output)?;
-    if format == Format::Exr && spec.post != Post::None {
+    let post = spec.effects.post.filter;
+    if format == Format::Exr && post != Post::None {
         let expected = "none for linear radiance (the filters work on the image that a .png shows)";
-        return Err(Failure::option("--post", spec.post.name(), expected));
+        return Err(Failure::option("--post", post.name(), expected));
     }
     check_file(&args.output)?;
     if let Some(stats) = &args.stats {

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use afterlight_techniques::{Exactness, ParamInfo, ParamKind, Params, Technique, registry, view};
+use afterlight_techniques::{Exactness, Technique, params_of, registry, view};
 use serde_json::{Value, json};
 
 use crate::args::ListArgs;
@@ -30,7 +30,7 @@ fn technique_json(technique: &dyn Technique) -> Value {
         "answers": info.answers,
         "appendix_a": info.appendix_a,
         "exactness": info.exactness,
-        "params": Params::known(info).collect::<Vec<_>>(),
+        "params": params_of(technique).infos(),
         "needs": info.needs.iter().map(|need| need.name).collect::<Vec<_>>(),
         "samples": info.samples,
         "tessellation": info.tessellation,
@@ -85,21 +85,10 @@ fn technique_text(technique: &dyn Technique) -> String {
     if !views.is_empty() {
         let _ = writeln!(text, "   views      {}", views.join(", "));
     }
-    for param in Params::known(info) {
-        let _ =
-            writeln!(text, "   --set {}={} ({}): {}", param.key, param.default, range(param), param.summary);
+    for param in params_of(technique).infos() {
+        let range = param.kind.range();
+        let _ = writeln!(text, "   --set {}={} ({range}): {}", param.key, param.default, param.summary);
     }
     text.push('\n');
     text
-}
-
-fn range(param: &ParamInfo) -> String {
-    match param.kind {
-        ParamKind::Choice { values } => values.join("|"),
-        ParamKind::Integer { min, max } => format!("{min} to {max}"),
-        ParamKind::AutoOrInteger { min, max } => format!("auto, {min} to {max}"),
-        ParamKind::Number { min, max } => format!("{min} to {max}"),
-        ParamKind::Words { values } => format!("none, {}", values.join("+")),
-        ParamKind::Text => "text".to_owned(),
-    }
 }

@@ -277,7 +277,7 @@ fn reference(session: &Session, listener: &dyn Listener) -> Result<Rgba8Image, L
 /// The columns: without anti-aliasing, filters after shading, and every way of several samples.
 fn columns(spec: &Spec, session: &Session, listener: &dyn Listener) -> Result<Vec<Column>, LabError> {
     let mut columns = vec![Column { setup: Setup::new(NONE, 1, "forward", &[])?, sweep: None }];
-    for post in Post::ALL.into_iter().filter(|post| *post != Post::None) {
+    for post in Post::ALL.iter().copied().filter(|post| *post != Post::None) {
         let setup = Setup::new(format!("{NONE}, {}", post.name()), 1, "forward", &[])?.post(post);
         columns.push(Column { setup, sweep: None });
     }

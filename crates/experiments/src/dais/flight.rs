@@ -171,7 +171,7 @@ pub(crate) fn fly(
     for at in places(path, asked.views) {
         let (renderer, workload) = session.with_settings(|settings| {
             (settings.width_px, settings.height_px) = (frame.width, frame.height);
-            settings.tessellate_px = frame.tessellate_px;
+            settings.effects.tessellation.edge_px = frame.effects.tessellation.edge_px;
             settings.camera = path.at(at);
         })?;
         let (measured, _) = measure_columns(&renderer, columns, &workload, asked.frames, listener)?;
@@ -230,7 +230,7 @@ impl Flight {
             scene: self.scene.clone(),
             width: self.frame.width,
             height: self.frame.height,
-            tessellate_px: self.frame.tessellate_px,
+            tessellate_px: self.frame.effects.tessellation.edge_px,
             column: column.label(),
             status: told.map_or(Status::Ok, |cell| cell.status),
             reason: told.and_then(|cell| cell.reason.clone()),
@@ -284,7 +284,9 @@ impl Flight {
         let device = &session.device;
         let tessellated = self
             .frame
-            .tessellate_px
+            .effects
+            .tessellation
+            .edge_px
             .map_or_else(String::new, |px| format!(", tessellated to {px:.2} pixels"));
         format!(
             "{experiment}: {} on {} ({}): {} triangles, {}×{}, {} samples{tessellated}, {} views, median (least – greatest of the views), {} frame(s) each, in turn; paper: {}\n\n{}\n{}\n",

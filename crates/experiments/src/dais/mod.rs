@@ -245,8 +245,9 @@ pub(crate) fn sizes(asked: &Conditions) -> [FrameSpec; 2] {
 }
 
 /// As the paper, with light gathered from a reflective shadow map, 64 samples a pixel.
-pub(crate) fn with_indirect(frame: FrameSpec) -> FrameSpec {
-    FrameSpec { indirect: Indirect::Rsm, ..frame }
+pub(crate) fn with_indirect(mut frame: FrameSpec) -> FrameSpec {
+    frame.effects.indirect.method = Indirect::Rsm;
+    frame
 }
 
 /// A result's times by the paper's columns, medians, ms; none where the device has no timestamps or nothing is of that kind.
@@ -417,6 +418,7 @@ pub(crate) fn reasons_text<'a>(
 mod tests {
     use super::flight::tests::conditions;
     use super::*;
+    use afterlight_techniques::{Cull, DrawParams};
 
     #[test]
     fn scenes_are_known_by_their_files() {
@@ -469,12 +471,12 @@ mod tests {
             assert_eq!(column.setup.is_some(), info.is_some(), "{}", column.label());
             if let (Some(setup), Some(info)) = (&column.setup, info) {
                 assert_eq!(setup.samples, PAPER_SAMPLES);
-                assert_eq!(setup.chosen.params.text(info, "cull"), "none", "{}", column.label());
+                assert_eq!(setup.chosen.params.typed::<DrawParams>().cull, Cull::None, "{}", info.id);
             }
         }
         let cache = all.iter().find(|column| column.kind == Kind::Cache).and_then(|c| c.setup.as_ref());
         let chosen = &cache.expect("in every build").chosen;
-        assert_eq!(chosen.params.text(chosen.technique.info(), "fill"), "cache");
+        assert_eq!(chosen.params.get("fill").as_deref(), Some("cache"));
         let of =
             |id: &str| columns(&Conditions { techniques: vec![id.to_owned()], ..conditions() }, &Kind::ALL);
         assert_eq!(of("dais").expect("known").len(), 2);

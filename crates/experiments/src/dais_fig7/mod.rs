@@ -8,8 +8,8 @@ use afterlight_lab::{Chosen, FrameSpec, LabError, Listener, Session, measure, te
 use afterlight_measure::Spread;
 use afterlight_report::text::grouped;
 use afterlight_scene::camera::CameraPath;
-use afterlight_techniques::Params;
 use afterlight_techniques::geometry::{MAX_TESSELLATE_PX, MIN_TESSELLATE_PX};
+use afterlight_techniques::{Cull, DrawParams};
 use serde::{Deserialize, Serialize};
 
 use crate::dais::flight::{
@@ -147,7 +147,8 @@ fn run(spec: &Spec, listener: &dyn Listener) -> Result<Outcome, LabError> {
             let target = paper.triangles * share;
             let chosen = choose_edge(&session, &path, frame, target, asked)?;
             gathered.notes.push(edge_note(&chosen));
-            let frame = FrameSpec { tessellate_px: Some(chosen.edge_px), ..frame.clone() };
+            let mut frame = frame.clone();
+            frame.effects.tessellation.edge_px = Some(chosen.edge_px);
             gathered.tessellation.push(chosen);
             let along = (&session, &path);
             flights.push(fly(Spec::NAME, along, source, &columns, &frame, asked, listener)?);
@@ -177,7 +178,7 @@ fn choose_edge(
         triangles,
         paper_triangles: target,
     };
-    if let Some(edge_px) = asked.frame.tessellate_px {
+    if let Some(edge_px) = asked.frame.effects.tessellation.edge_px {
         return Ok(of(edge_px, None));
     }
     let (mut edge_px, mut triangles) = (DEFAULT_EDGE_PX, None);
@@ -209,13 +210,13 @@ fn count_triangles(
     asked: &Conditions,
 ) -> Result<Option<u64>, LabError> {
     // Any technique that tessellates draws the same triangles; one sample a pixel is the least work.
-    let mut counter = Chosen { technique: technique("technique", "tiled")?, params: Params::default() };
-    counter.params.set(counter.technique.info(), "cull", "none")?;
+    let mut counter = Chosen::new(technique("technique", "tiled")?);
+    counter.params.typed_mut::<DrawParams>().cull = Cull::None;
     let mut most = None;
     for at in places(path, asked.views.min(PROBES)) {
         let (renderer, workload) = session.with_settings(|settings| {
             (settings.width_px, settings.height_px) = (frame.width, frame.height);
-            settings.tessellate_px = Some(edge_px);
+            settings.effects.tessellation.edge_px = Some(edge_px);
             settings.camera = path.at(at);
         })?;
         let measured = measure(&renderer, &counter, &workload, 0, || {})?;

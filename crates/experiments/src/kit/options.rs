@@ -72,14 +72,15 @@ pub(crate) fn check_run(scale: f64, frames: u32, frame: &FrameSpec) -> Result<()
 /// The frames' settings at a share of their width and height; one sample, the final image without a filter.
 pub(crate) fn at_size(frame: &FrameSpec, scale: f64) -> FrameSpec {
     let scaled = |px: u32| ((f64::from(px) * scale).round() as u32).max(1);
-    FrameSpec {
+    let mut frame = FrameSpec {
         width: scaled(frame.width),
         height: scaled(frame.height),
         samples: 1,
-        post: Post::None,
         view: view::FINAL.to_owned(),
         ..frame.clone()
-    }
+    };
+    frame.effects.post.filter = Post::None;
+    frame
 }
 
 /// Numbers of samples of an experiment: those up to the number that was given, or it alone where it is below them all.

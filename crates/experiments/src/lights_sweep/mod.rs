@@ -14,7 +14,11 @@ use afterlight_measure::{Memory, RunResult, SCHEMA, Spread, Status};
 use afterlight_report::text::{self, grouped, number_text, status_text};
 use afterlight_report::{Axes, Chart, Line, bytes_text, ms_text};
 use afterlight_techniques::cost::{Cost, Workload};
-use afterlight_techniques::{Exactness, Params, Post, view};
+use afterlight_techniques::{
+    Exactness, Post,
+    stages::lights::step::{Lights, asked},
+    view,
+};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -162,7 +166,7 @@ impl Predicted {
     /// Predicts a set-up's costs. A technique that visits all lights has every pair of a light and a pixel for the model's `lf`.
     fn of(setup: &Setup, workload: &Workload) -> Self {
         let Chosen { technique, params } = &setup.chosen;
-        let visits_all = params.text(technique.info(), LIGHTS_KEY) == "all";
+        let visits_all = asked(params) == Some(Lights::All);
         let counted = Workload {
             shading_samples: f64::from(setup.samples),
             light_fragments: match visits_all {
@@ -261,9 +265,6 @@ struct Sweep {
     symbols: Vec<Symbols>,
     growth: Vec<Growth>,
 }
-
-/// Parameter of techniques that visit all lights or those of tiles.
-const LIGHTS_KEY: &str = "lights";
 
 fn run(spec: &Spec, listener: &dyn Listener) -> Result<Outcome, LabError> {
     check_run(spec.scale, spec.frames, &spec.frame)?;
@@ -425,7 +426,7 @@ fn object_fragments(session: &Session) -> Result<Option<f64>, LabError> {
         settings.lights.truncate(1);
         settings.samples = 1;
     })?;
-    let chosen = Chosen { technique: technique("technique", "forward")?, params: Params::default() };
+    let chosen = Chosen::new(technique("technique", "forward")?);
     let result = measure(&renderer, &chosen, &workload, 0, || {})?.result;
     Ok(most_fragments(&result).map(|count| count as f64))
 }

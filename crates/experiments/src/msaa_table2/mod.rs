@@ -261,7 +261,7 @@ fn setups(spec: &Spec) -> Result<Vec<(Setup, PaperColumn)>, LabError> {
         (Setup::new("deferred 1x", 1, "deferred", &[])?, PaperColumn::None),
         (Setup::new("tiled 1x", 1, "tiled", &[])?, PaperColumn::None),
     ];
-    for post in Post::ALL.into_iter().filter(|post| *post != Post::None) {
+    for post in Post::ALL.iter().copied().filter(|post| *post != Post::None) {
         let label = format!("deferred 1x, {}", post.name());
         all.push((Setup::new(label, 1, "deferred", &[])?.post(post), PaperColumn::None));
     }

@@ -9,7 +9,6 @@ use afterlight_lab::{
 };
 use afterlight_measure::{Run, SCHEMA, Spread};
 use afterlight_report::{bytes_text, ms_text};
-use afterlight_techniques::Params;
 use serde::{Deserialize, Serialize};
 
 use crate::kit::{
@@ -125,8 +124,7 @@ fn run(spec: &Spec, listener: &dyn Listener) -> Result<Outcome, LabError> {
         for &lights in &spec.light_counts {
             let frame = FrameSpec { lights, ..frame.clone() };
             let session = Session::open(scene, &frame, false, listener)?;
-            let reference =
-                Chosen { technique: technique("reference", "forward")?, params: Params::default() };
+            let reference = Chosen::new(technique("reference", "forward")?);
             let compared = compare(&session, &frame, &chosen, reference, spec.frames, listener)?;
             listener.tell(&compare_text(&compared.run, false));
             session.finish(&frame, listener)?;

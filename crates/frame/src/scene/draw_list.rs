@@ -4,34 +4,10 @@ use afterlight_graph::gpu::{self, vk};
 use afterlight_scene::Aabb;
 use glam::{Mat4, Vec3, Vec4};
 
-use crate::scene::{BUCKETS, DrawInfo, SceneGpu};
-
-/// How draws are chosen and ordered.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct DrawOptions {
-    /// Leaves out draws whose bounds lie outside the view.
-    pub cull: bool,
-    /// Order of the draws of each bucket.
-    pub order: DrawOrder,
-}
-
-/// Order of draws: from near to far, early depth tests save shading.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum DrawOrder {
-    /// By the distance of the nearest point of their bounds. Failed: on Sponza at 3840×2160 on an H200 it shades 26.5 M
-    /// fragments, as many as no order at all (27.0 M); large draws that reach near the eye hide little.
-    Near,
-    /// By the distance of the centre of their bounds: 17.0 M fragments there, the ID pass in 4.5 ms instead of 6.0.
-    Center,
-    /// As in the scene.
-    Scene,
-}
-
-impl Default for DrawOptions {
-    fn default() -> Self {
-        Self { cull: true, order: DrawOrder::Center }
-    }
-}
+use crate::{
+    Cull, DrawOrder, DrawParams,
+    scene::{BUCKETS, DrawInfo, SceneGpu},
+};
 
 /// `VkDrawIndexedIndirectCommand`.
 #[repr(C)]
@@ -59,14 +35,14 @@ pub struct DrawList {
     /// Number of commands of each bucket, 32 bits each.
     pub counts: gpu::Buffer,
     /// How draws are chosen and ordered.
-    pub options: DrawOptions,
+    pub options: DrawParams,
     /// Draws in view, by bucket, in drawing order.
     pub visible: [Vec<u32>; BUCKETS],
 }
 
 impl DrawList {
     /// An empty list with room for every draw of a scene.
-    pub fn new(device: &gpu::Device, scene: &SceneGpu, options: DrawOptions) -> Result<Self, gpu::GpuError> {
+    pub fn new(device: &gpu::Device, scene: &SceneGpu, options: DrawParams) -> Result<Self, gpu::GpuError> {
         let buffer = |name, bytes| {
             device.create_buffer(&gpu::BufferDesc {
                 name,
@@ -98,7 +74,7 @@ impl DrawList {
             let (first, end) = (scene.bucket_first[bucket], scene.bucket_first[bucket + 1]);
             let in_view = |draw: &u32| {
                 let bounds = &scene.draw_infos[*draw as usize].bounds_ws;
-                !self.options.cull || frustum.touches(&displaced(bounds, displacement_m))
+                self.options.cull == Cull::None || frustum.touches(&displaced(bounds, displacement_m))
             };
             let mut keyed: Vec<(f32, u32)> = (first..end)
                 .filter(in_view)

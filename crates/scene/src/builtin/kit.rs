@@ -60,6 +60,17 @@ impl MeshData {
         position: impl Fn(f64, f64) -> DVec3 + Sync,
         uv: impl Fn(f64, f64) -> DVec2 + Sync,
     ) {
+        self.patch_of(divisions, front, &position, &uv);
+    }
+
+    /// [`Self::patch`], compiled once rather than for each surface's functions.
+    fn patch_of(
+        &mut self,
+        divisions: [u32; 2],
+        front: Front,
+        position: &(dyn Fn(f64, f64) -> DVec3 + Sync),
+        uv: &(dyn Fn(f64, f64) -> DVec2 + Sync),
+    ) {
         let [n_s, n_t] = divisions.map(|n| n.max(1));
         if self.counting {
             self.counted += 2 * n_s * n_t;

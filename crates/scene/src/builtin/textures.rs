@@ -48,6 +48,16 @@ pub(super) fn baked_material(
     size_px: u32,
     texel: impl Fn(f32, f32) -> Texel + Sync,
 ) -> Material {
+    bake(b, name, size_px, &texel)
+}
+
+/// [`baked_material`], compiled once rather than for each texture's function.
+fn bake(
+    b: &mut SceneBuilder,
+    name: &str,
+    size_px: u32,
+    texel: &(dyn Fn(f32, f32) -> Texel + Sync),
+) -> Material {
     let size = size_px as usize;
     let at = |i: usize| (i as f32 + 0.5) / size_px as f32;
     let texels: Vec<Texel> = (0..size * size)

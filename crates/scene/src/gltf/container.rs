@@ -112,7 +112,9 @@ fn parse_json(file: &Path, text: &[u8]) -> Result<Root, SceneError> {
     if text.starts_with(b"\xEF\xBB\xBF") {
         return Err(SceneError::invalid(file, "JSON", "a byte order mark", "UTF-8 without one"));
     }
-    let first_error = match json::deserialize::from_slice::<Root>(text) {
+    // `Root::from_slice` alone reads the typed document: each other reader of it, from a value or a type of text, would be
+    // compiled here once more, for most of this crate's time.
+    let first_error = match Root::from_slice(text) {
         Ok(root) => return Ok(root),
         Err(e) => e,
     };
@@ -124,7 +126,8 @@ fn parse_json(file: &Path, text: &[u8]) -> Result<Root, SceneError> {
     drop_extras(&mut value);
     add_missing_scene_nodes(&mut value);
     drop_untargeted_channels(&mut value);
-    json::deserialize::from_value(value).map_err(|_| wrong(&first_error))
+    let mended = json::serialize::to_vec(&value).map_err(|e| wrong(&e))?;
+    Root::from_slice(&mended).map_err(|_| wrong(&first_error))
 }
 
 fn kind_of(value: &Value) -> &'static str {

@@ -13,7 +13,7 @@ use afterlight_frame::{
 use afterlight_shader::Shader;
 use afterlight_stages::{
     lights::{
-        cells::{self, Division, Grid, VisibleDepths},
+        cells::{self, ClusterParams, Division, VisibleDepths},
         step::LightStep,
     },
     surfaces::gbuffer,
@@ -46,15 +46,11 @@ static INFO: Info = Info {
         rates_decoupled: "n, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
-    params: afterlight_frame::params::CLUSTERS,
-    needs: &[],
-    samples: &[1],
-    tessellation: true,
-    views: &[],
+    ..Info::USUAL
 };
 
 fn division(params: &Params) -> Division {
-    Division::Clusters(Grid::of_params(params))
+    Division::Clusters(*params.typed())
 }
 
 impl Technique for Clustered {
@@ -66,15 +62,19 @@ impl Technique for Clustered {
         &crate::SHADERS
     }
 
+    fn params(&self) -> Params {
+        Params::of(ClusterParams::default())
+    }
+
     fn predict(&self, workload: &Workload, params: &Params) -> Cost {
         cost::clustered_deferred(workload, division(params).most_pixels())
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let filled = gbuffer::fill(graph, frame, INFO.id, vk::Format::D32_SFLOAT)?;
-        let surfaces = VisibleDepths::of_depth(&filled.depth, 1);
-        let lists = cells::build(graph, frame, INFO.id, division(frame.params), &surfaces)?;
-        drop(surfaces);
+        let division = division(frame.params);
+        let lists =
+            cells::build(graph, frame, INFO.id, division, &VisibleDepths::of_depth(&filled.depth, 1))?;
         gbuffer::shade(graph, frame, INFO.id, filled, &LightStep::Cells(lists))
     }
 }

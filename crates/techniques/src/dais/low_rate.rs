@@ -1,29 +1,65 @@
 //! Indirect light of the family at a lower rate than direct light: its parameters, and what shading takes of them.
 
-use afterlight_frame::{Frame, Info, ParamInfo, ParamKind, SourceSlots, TechniqueError};
+use afterlight_frame::{
+    Frame, SourceSlots, TechniqueError,
+    params::{choices, parameters},
+};
 use afterlight_graph::gpu;
 use afterlight_stages::shared::indirect::IndirectLight;
 
-const RATE_VALUES: &[&str] = &["1", "1/2", "1/4", "1/8"];
-const RATE_SUMMARY: &str =
-    "shading samples of indirect light a pixel along each axis; a triangle's neighbouring pixels share one";
+choices! {
+    /// Shading samples of indirect light a pixel along each axis.
+    pub enum Rate {
+        /// One a pixel.
+        Full = "1",
+        /// One for 2 × 2 pixels.
+        Half = "1/2",
+        /// One for 4 × 4 pixels.
+        Quarter = "1/4",
+        /// One for 8 × 8 pixels.
+        Eighth = "1/8",
+    }
+}
 
-/// Rate of indirect light, where the technique is made for low ones.
-pub(crate) const RATE: ParamInfo = ParamInfo {
-    key: "rate",
-    summary: RATE_SUMMARY,
-    kind: ParamKind::Choice { values: RATE_VALUES },
-    default: "1/2",
-};
-/// Rate of indirect light, where full rate is what is expected.
-pub(crate) const FULL_RATE: ParamInfo = ParamInfo { default: "1", ..RATE };
-/// How pixels find whom they share a sample with.
-pub(crate) const SHARE: ParamInfo = ParamInfo {
-    key: "share",
-    summary: "who shares a shading sample: pixels of a cell of the shading grid, by a memoization table, or quads that one triangle fills, by subgroup quad operations (rate 1/2 alone); auto: quads where there can be",
-    kind: ParamKind::Choice { values: &["auto", "grid", "quads"] },
-    default: "auto",
-};
+impl Rate {
+    /// Width and height of the cell of pixels that may share a sample.
+    pub fn cell_px(self) -> u32 {
+        match self {
+            Self::Full => 1,
+            Self::Half => 2,
+            Self::Quarter => 4,
+            Self::Eighth => 8,
+        }
+    }
+}
+
+choices! {
+    /// How pixels find whom they share a sample with.
+    pub enum Share {
+        /// Quads where there can be, else the grid.
+        Auto = "auto",
+        /// Pixels of a cell of the shading grid, by a memoization table.
+        Grid = "grid",
+        /// Quads that one triangle fills, by subgroup quad operations.
+        Quads = "quads",
+    }
+}
+
+parameters! {
+    /// At what rate indirect light is shaded, where the technique is made for low ones.
+    #[derive(Copy)]
+    pub struct RateParams {
+        /// shading samples of indirect light a pixel along each axis; a triangle's neighbouring pixels share one
+        rate: Rate = Rate::Half, "rate";
+        /// who shares a shading sample: pixels of a cell of the shading grid, by a memoization table, or quads that one triangle fills, by subgroup quad operations (rate 1/2 alone); auto: quads where there can be
+        share: Share = Share::Auto, "share";
+    }
+}
+
+impl RateParams {
+    /// Where full rate is what is expected.
+    pub const FULL: Self = Self { rate: Rate::Full, share: Share::Auto };
+}
 
 /// Subgroup quad operations in compute shaders.
 fn has_quads(features: &gpu::Features) -> bool {
@@ -48,29 +84,31 @@ pub(crate) struct LowRate {
 }
 
 impl LowRate {
-    /// What a frame of the technique asks for by its parameters [`RATE`] and [`SHARE`]; `None` at full rate or without indirect
-    /// light.
+    /// What parameters ask for; `None` at full rate or without indirect light.
     ///
     /// # Errors
     /// Quads at another rate than 1/2; what the device lacks.
-    pub fn chosen(frame: &Frame<'_>, info: &'static Info) -> Result<Option<Self>, TechniqueError> {
-        let rate = frame.params.text(info, RATE.key);
-        let cell_px: u32 = rate.rsplit('/').next().and_then(|n| n.parse().ok()).unwrap_or(1);
-        let quads = match frame.params.text(info, SHARE.key) {
-            "auto" => cell_px == 2 && has_quads(frame.features()),
-            share => share == "quads",
+    pub fn chosen(
+        frame: &Frame<'_>,
+        technique: &'static str,
+        RateParams { rate, share }: RateParams,
+    ) -> Result<Option<Self>, TechniqueError> {
+        let quads = match share {
+            Share::Auto => rate == Rate::Half && has_quads(frame.features()),
+            Share::Grid => false,
+            Share::Quads => true,
         };
-        if quads && cell_px != 2 {
+        if quads && rate != Rate::Half {
             return Err(TechniqueError::Conflict {
-                technique: info.id,
+                technique,
                 found: format!("share=quads with rate={rate}"),
                 expected: "rate=1/2, or share=grid".to_owned(),
             });
         }
-        if cell_px == 1 || !frame.board.has::<IndirectLight>() {
+        if rate == Rate::Full || !frame.board.has::<IndirectLight>() {
             return Ok(None);
         }
-        let unavailable = |missing: String| Err(TechniqueError::Unavailable { technique: info.id, missing });
+        let unavailable = |missing: String| Err(TechniqueError::Unavailable { technique, missing });
         if quads && !has_quads(frame.features()) {
             return unavailable(
                 "subgroup quad operations for share=quads (share=grid does without)".to_owned(),
@@ -84,7 +122,7 @@ impl LowRate {
                 frame.samples
             ));
         }
-        Ok(Some(Self { cell_px, quads }))
+        Ok(Some(Self { cell_px: rate.cell_px(), quads }))
     }
 
     /// Tag of the shading shader's variants.

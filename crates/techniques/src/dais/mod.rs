@@ -2,27 +2,34 @@
 
 // ORDER: 140
 
-pub(crate) mod low_rate;
+mod low_rate;
+mod params;
 mod passes;
 
+pub(crate) use low_rate::LowRate;
+pub use low_rate::{Rate, RateParams, Share};
+pub use params::{CacheParams, DaisParams, Fill, FillParams};
 pub(crate) use passes::{FillPass, depth_surfaces};
 
 pub mod cost;
 
 use afterlight_graph::{BufferHandle, BufferRole, Graph, ImageHandle, Load, PassRole, RasterPass, gpu::vk};
 
-use crate::dais::low_rate::LowRate;
 use afterlight_cost::{Cost, Workload};
 use afterlight_frame::{
-    ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, OpaqueDepth, ParamInfo, ParamKind, Params,
-    Source, SourceSlots, Technique, TechniqueError, views,
+    ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, OpaqueDepth, Params, Source, SourceSlots,
+    Technique, TechniqueError, views,
 };
 use afterlight_shader::Shader;
 use afterlight_stages::{
-    lights::{cells, step},
+    lights::{
+        cells,
+        step::{self, LightMethod},
+    },
     surfaces::shade::SurfaceSource,
     surfaces::{
-        compute_raster, shade,
+        compute_raster::{ComputeRasterParams, Visibility},
+        shade,
         triangles::{self, Records},
         visible::NO_TRIANGLE_RGBA8,
         visible::Visible,
@@ -35,28 +42,6 @@ pub static TECHNIQUE: Dais = Dais;
 
 /// See the module.
 pub struct Dais;
-
-/// Who fills the triangle buffer.
-pub(crate) const FILL: ParamInfo = ParamInfo {
-    key: "fill",
-    summary: "who fills the triangle buffer: compute over a finished visibility buffer, or fragments through a memoization cache after a depth pre-pass (the paper's); auto: compute, fragments where surfaces are tessellated",
-    kind: ParamKind::Choice { values: &["auto", "resolve", "cache"] },
-    default: "auto",
-};
-/// How many triangles samples tell apart that hold coverage as well.
-pub(crate) const REFERENCE_BITS: ParamInfo = ParamInfo {
-    key: "reference-bits",
-    summary: "fill=cache: bits of the reference in a visibility sample that holds coverage as well; where triangles need more, samples hold 32 bits of reference and no coverage",
-    kind: ParamKind::Integer { min: 8, max: 24 },
-    default: "24",
-};
-/// Size of the memoization cache.
-pub(crate) const CACHE_BUCKETS: ParamInfo = ParamInfo {
-    key: "cache-buckets",
-    summary: "buckets of two entries in the memoization cache through which fragments store triangles",
-    kind: ParamKind::Integer { min: 1, max: 1 << 16 },
-    default: "8192",
-};
 
 /// Most triangles that a visibility sample's 32 bits tell apart; all ones is the background.
 const REFERENCES_MAX: u32 = u32::MAX - 1;
@@ -74,9 +59,7 @@ pub(crate) struct Cache {
 
 impl Cache {
     /// Declares an empty cache.
-    pub fn new(graph: &mut Graph, frame: &Frame<'_>, info: &Info) -> Self {
-        let buckets = frame.params.number(info, CACHE_BUCKETS.key) as u32;
-        let technique = info.id;
+    pub fn new(graph: &mut Graph, technique: &str, CacheParams { buckets }: CacheParams) -> Self {
         let entries = graph.buffer(
             &format!("{technique}/cache entries"),
             BufferRole::MemoizationCache,
@@ -130,25 +113,16 @@ static INFO: Info = Info {
     ],
     answers: Answers {
         surface: "triangle IDs and a triangle buffer",
-        lights: "loop over all, tiles, clusters, or a tree",
+        lights: step::ANSWER,
         schedule: "compute, a thread a pixel",
         resolve: "once a triangle",
     },
     appendix_a: APPENDIX_A,
     // Texture gradients are analytic.
     exactness: Exactness::Exact { min_psnr_db: 45.0 },
-    params: &[
-        step::LIGHTS,
-        FILL,
-        CACHE_BUCKETS,
-        REFERENCE_BITS,
-        compute_raster::VISIBILITY,
-        compute_raster::SMALL,
-    ],
-    needs: &[],
     samples: ANY_SAMPLES,
-    tessellation: true,
     views: views::TRIANGLES,
+    ..Info::USUAL
 };
 
 impl Technique for Dais {
@@ -160,41 +134,57 @@ impl Technique for Dais {
         &crate::SHADERS
     }
 
+    fn params(&self) -> Params {
+        Params::of(DaisParams::default())
+    }
+
     fn predict(&self, workload: &Workload, params: &Params) -> Cost {
-        match params.text(&INFO, FILL.key) {
-            "cache" => cost::dais_cached(workload),
-            _ => cost::dais(workload),
+        match params.typed::<FillParams>().fill {
+            Fill::Cache => cost::dais_cached(workload),
+            Fill::Auto | Fill::Resolve => cost::dais(workload),
         }
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
-        record(graph, frame, &INFO, None)
+        let params = frame.params.typed::<DaisParams>();
+        let lights = params.light_step().method(frame);
+        let asked = Asked { technique: INFO.id, lights, rate: None };
+        record(graph, frame, &asked, (params.fill, params.raster))
     }
 }
 
-/// Declares the passes of `dais` for a technique with its parameters, indirect light at a low rate where one is given.
+/// How a technique of this family shades what it has found.
+pub(crate) struct Asked {
+    /// The technique, whose name passes have.
+    pub technique: &'static str,
+    /// How surfaces find their lights.
+    pub lights: LightMethod,
+    /// Indirect light at a low rate, where that is asked for.
+    pub rate: Option<LowRate>,
+}
+
+/// Declares the passes of `dais` for a technique, the triangle buffer filled and triangles found as the parameters say.
 ///
 /// # Errors
 /// What the device lacks, parameters that do not go together, more triangles than one binding holds.
 pub(crate) fn record(
     graph: &mut Graph,
     frame: &Frame<'_>,
-    info: &'static Info,
-    rate: Option<&LowRate>,
+    asked: &Asked,
+    (fill, raster): (FillParams, ComputeRasterParams),
 ) -> Result<ImageHandle, TechniqueError> {
-    if is_cached(frame, info)? {
-        return record_cached(graph, frame, info, rate);
+    if is_cached(frame, asked.technique, fill.fill, raster.visibility)? {
+        return record_cached(graph, frame, asked, fill);
     }
-    let visible = Visible::find(graph, frame, info, frame.samples)?;
-    let triangles = triangles::fill(graph, frame, info.id, &visible)?;
+    let visible = Visible::find(graph, frame, asked.technique, raster, frame.samples)?;
+    let triangles = triangles::fill(graph, frame, asked.technique, &visible)?;
     let tag = visible.tag_after("");
-    let surfaces = visible.surfaces();
-    let radiance =
-        shade(graph, frame, info, rate, (source_of(frame, &tag), &surfaces), &triangles.records, &|pass| {
-            visible.bind(frame, pass);
-            triangles.bind(pass);
-        })?;
-    drop(surfaces);
+    let bind = |pass: &mut dyn SourceSlots| {
+        visible.bind(frame, pass);
+        triangles.bind(pass);
+    };
+    let source = source_of(frame, &tag);
+    let radiance = shade(graph, frame, asked, (source, &visible.surfaces()), &triangles.records, &bind)?;
     if let Visible::Ids { depth, .. } = visible {
         frame.board.put(OpaqueDepth(depth));
     }
@@ -206,22 +196,22 @@ fn source_of<'a>(frame: &Frame<'_>, tag: &'a str) -> SurfaceSource<'a> {
     SurfaceSource { folder: "dais", tag, shading_tag: None, samples: frame.samples }
 }
 
-/// Declares the shading pass by the technique's parameters or, where the frame shows a view of `records`, its passes; `bind` binds
-/// what `source`, whose surfaces stand where it says, reads.
+/// Declares the shading pass or, where the frame shows a view of `records`, its passes; `bind` binds what `source`, whose surfaces
+/// stand where it says, reads.
 pub(crate) fn shade(
     graph: &mut Graph,
     frame: &Frame<'_>,
-    info: &'static Info,
-    rate: Option<&LowRate>,
+    asked: &Asked,
     (source, surfaces): (SurfaceSource<'_>, &cells::VisibleDepths<'_>),
     records: &Records,
     bind: &dyn Fn(&mut dyn SourceSlots),
 ) -> Result<ImageHandle, TechniqueError> {
+    let Asked { technique, lights, ref rate } = *asked;
     if views::is_of_triangles(frame.view) {
-        return RecordSource { technique: info.id, source, records, bind }.record(graph, frame);
+        return RecordSource { technique, source, records, bind }.record(graph, frame);
     }
-    let source = SurfaceSource { shading_tag: rate.map(LowRate::tag), ..source };
-    shade::shade(graph, frame, info, source, surfaces, &|pass| {
+    let source = SurfaceSource { shading_tag: rate.as_ref().map(LowRate::tag), ..source };
+    shade::shade(graph, frame, (technique, lights), source, surfaces, &|pass| {
         if let Some(rate) = rate {
             rate.constants(pass);
         }
@@ -229,26 +219,25 @@ pub(crate) fn shade(
     })
 }
 
-/// Whether fragments store their triangles through the cache: by [`FILL`], and of tessellated surfaces, whose triangles no index
+/// Whether fragments store their triangles through the cache: as asked for, and of tessellated surfaces, whose triangles no index
 /// leads back to, always.
-fn is_cached(frame: &Frame<'_>, info: &Info) -> Result<bool, TechniqueError> {
+fn is_cached(
+    frame: &Frame<'_>,
+    technique: &'static str,
+    fill: Fill,
+    visibility: Visibility,
+) -> Result<bool, TechniqueError> {
     let conflict = |found: &str, expected: &str| {
-        Err(TechniqueError::Conflict {
-            technique: info.id,
-            found: found.to_owned(),
-            expected: expected.to_owned(),
-        })
+        Err(TechniqueError::Conflict { technique, found: found.to_owned(), expected: expected.to_owned() })
     };
-    let tessellated = frame.tessellate_px.is_some();
-    let cached = match frame.params.text(info, FILL.key) {
-        "resolve" if tessellated => {
+    let cached = match (fill, frame.tessellate_px.is_some()) {
+        (Fill::Resolve, true) => {
             return conflict("fill=resolve with --tessellate", "fill=cache, or auto");
         }
-        "resolve" => false,
-        "cache" => true,
-        _ => tessellated,
+        (Fill::Auto | Fill::Resolve, false) => false,
+        (Fill::Auto, true) | (Fill::Cache, _) => true,
     };
-    if cached && frame.params.text(info, compute_raster::VISIBILITY.key) == "compute" {
+    if cached && visibility == Visibility::Compute {
         let found = "visibility=compute where fragments fill the triangle buffer (fill=cache, --tessellate)";
         return conflict(found, "visibility=raster, or auto");
     }
@@ -257,10 +246,9 @@ fn is_cached(frame: &Frame<'_>, info: &Info) -> Result<bool, TechniqueError> {
 
 /// Whether samples hold 32 bits of reference and no coverage: where there are more triangles than fewer bits tell apart, more
 /// samples than a mask has bits, or a device without post-depth coverage.
-fn is_wide(frame: &Frame<'_>, info: &Info) -> bool {
-    let bits = frame.params.number(info, REFERENCE_BITS.key) as u32;
+fn is_wide(frame: &Frame<'_>, reference_bits: u32) -> bool {
     // All ones with full coverage is the background; what finds no place is the one before.
-    let narrow_max = (1_u32 << bits).saturating_sub(2);
+    let narrow_max = (1_u32 << reference_bits).saturating_sub(2);
     triangles::capacity(frame) > narrow_max
         || frame.samples > COVERAGE_SAMPLES_MAX
         || !frame.features().post_depth_coverage
@@ -271,21 +259,22 @@ fn is_wide(frame: &Frame<'_>, info: &Info) -> bool {
 fn record_cached(
     graph: &mut Graph,
     frame: &Frame<'_>,
-    info: &'static Info,
-    rate: Option<&LowRate>,
+    asked: &Asked,
+    params: FillParams,
 ) -> Result<ImageHandle, TechniqueError> {
-    let wide = is_wide(frame, info);
-    let name = |part: &str| format!("{}/{part}", info.id);
+    let technique = asked.technique;
+    let wide = is_wide(frame, params.reference_bits);
+    let name = |part: &str| format!("{technique}/{part}");
     let references = name(if wide { "wide references" } else { "references" });
     let references =
         graph.image(&references, BufferRole::Visibility, frame.multisampled_info(vk::Format::R8G8B8A8_UNORM));
     let depth =
         graph.image(&name("depth"), BufferRole::Depth, frame.multisampled_info(vk::Format::D32_SFLOAT));
-    let cache = Cache::new(graph, frame, info);
-    let list = triangles::List::new(graph, frame, info.id, REFERENCES_MAX)?;
+    let cache = Cache::new(graph, technique, params.cache);
+    let list = triangles::List::new(graph, frame, technique, REFERENCES_MAX)?;
     let tags = if wide { &["wide"][..] } else { &[] };
     let depth_only = depth_surfaces(frame)?;
-    let mut fill = FillPass::new(graph, frame, info, "dais/fill.frag", tags)?;
+    let mut fill = FillPass::new(graph, frame, technique, "dais/fill.frag", tags)?;
     fill.surfaces.constants = cache.constants(&list);
 
     let depth = depth_only.fill_depth(graph, frame, (&name("depth"), PassRole::DepthPrepass), depth);
@@ -299,10 +288,11 @@ fn record_cached(
     fill.draw(frame, &mut pass);
     pass.finish();
 
-    let triangles = list.derivatives(graph, frame, info.id)?;
+    let triangles = list.derivatives(graph, frame, technique)?;
     let visible = Visible::Ids { ids: references, depth, samples: frame.samples };
     let tag = visible.tag_after(if wide { "wide" } else { "refs" });
-    shade(graph, frame, info, rate, (source_of(frame, &tag), &visible.surfaces()), &triangles, &|pass| {
+    let source = (source_of(frame, &tag), &visible.surfaces());
+    shade(graph, frame, asked, source, &triangles, &|pass| {
         visible.bind(frame, pass);
         triangles.bind(pass);
     })

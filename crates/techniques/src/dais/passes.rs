@@ -2,7 +2,7 @@
 
 use afterlight_graph::{BufferHandle, BufferRole, DepthTest, Graph, PassRole, RasterPass};
 
-use afterlight_frame::{Frame, Info, TechniqueError};
+use afterlight_frame::{Frame, TechniqueError};
 use afterlight_stages::surfaces::geometry::SceneDraws;
 
 /// What the first pass draws: depth alone. In tessellated frames both passes have a geometry shader, so that their depths are
@@ -31,7 +31,7 @@ impl FillPass {
     pub fn new(
         graph: &mut Graph,
         frame: &Frame<'_>,
-        info: &Info,
+        technique: &'static str,
         fragment: &str,
         tags: &[&str],
     ) -> Result<Self, TechniqueError> {
@@ -47,10 +47,10 @@ impl FillPass {
             )?;
             return Ok(Self { surfaces: fill.depth(DepthTest::EQUAL), numbers: None });
         }
-        let fill = SceneDraws::shaded(frame, &opaque, &masked)?.whole_triangles(frame, info.id)?;
-        let numbers = graph.buffer(&format!("{}/triangle numbers", info.id), BufferRole::Counters, 4);
+        let fill = SceneDraws::shaded(frame, &opaque, &masked)?.whole_triangles(frame, technique)?;
+        let numbers = graph.buffer(&format!("{technique}/triangle numbers"), BufferRole::Counters, 4);
         let numbers = graph.clear_buffer(
-            &format!("{}/clear triangle numbers", info.id),
+            &format!("{technique}/clear triangle numbers"),
             PassRole::Geometry,
             numbers,
             0,

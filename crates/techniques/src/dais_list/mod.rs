@@ -3,20 +3,17 @@
 // ORDER: 150
 
 pub mod cost;
+mod params;
+
+pub use params::DaisListParams;
 
 use afterlight_graph::{BufferHandle, BufferRole, Graph, ImageHandle, ImageInfo, Load, PassRole, RasterPass};
 
-use crate::{
-    dais::{
-        self, Cache, FillPass,
-        low_rate::{FULL_RATE, LowRate, SHARE},
-    },
-    gbuffer_list,
-};
+use crate::dais::{self, Asked, Cache, CacheParams, FillPass, LowRate};
 use afterlight_cost::{Cost, Workload};
 use afterlight_frame::{
-    Answers, Exactness, Frame, Info, MULTIPLE_SAMPLES, Need, ParamInfo, ParamKind, Params, Source,
-    SourceSlots, Technique, TechniqueError, capacity::FIRST_GUESS, scene::DRAW_TRIANGLES, views,
+    Answers, Exactness, Frame, Info, MULTIPLE_SAMPLES, Need, Params, Source, SourceSlots, Technique,
+    TechniqueError, capacity::FIRST_GUESS, params::AutoOr, scene::DRAW_TRIANGLES, views,
 };
 use afterlight_shader::Shader;
 use afterlight_stages::{
@@ -32,20 +29,6 @@ pub static TECHNIQUE: DaisList = DaisList;
 /// See the module.
 pub struct DaisList;
 
-const NODES: ParamInfo = ParamInfo {
-    key: "nodes",
-    summary: "nodes of the lists; auto: as many as the view needs, counted; fixed: what finds none is dropped and told",
-    kind: ParamKind::AutoOrInteger { min: 0, max: 1 << 30 },
-    default: "auto",
-};
-
-const BANDS: ParamInfo = ParamInfo {
-    key: "bands",
-    summary: "horizontal bands of the image that are drawn one after another, so that depth at the samples is held for one of them",
-    kind: ParamKind::Integer { min: 1, max: 16 },
-    default: "2",
-};
-
 /// Most triangles that the reference of an entry tells apart.
 const fn references_max(samples: u32) -> u32 {
     1 << if samples > 8 { 27 } else { 28 }
@@ -60,17 +43,16 @@ static INFO: Info = Info {
     sources: &[Source { key: "schied-2015", section: "4.1" }],
     answers: Answers {
         surface: "per-pixel lists of triangle references, and a triangle buffer",
-        lights: "loop over all, tiles, clusters, or a tree",
+        lights: step::ANSWER,
         schedule: "compute, a thread a pixel",
         resolve: "once a triangle, weighted by coverage",
     },
     appendix_a: dais::APPENDIX_A,
     exactness: Exactness::Exact { min_psnr_db: 45.0 },
-    params: &[step::LIGHTS, NODES, BANDS, dais::CACHE_BUCKETS, FULL_RATE, SHARE],
     needs: &[Need { name: "post-depth coverage", test: |features| features.post_depth_coverage }],
     samples: MULTIPLE_SAMPLES,
-    tessellation: true,
     views: views::TRIANGLES,
+    ..Info::USUAL
 };
 
 impl Technique for DaisList {
@@ -82,14 +64,19 @@ impl Technique for DaisList {
         &crate::SHADERS
     }
 
+    fn params(&self) -> Params {
+        Params::of(DaisListParams::default())
+    }
+
     fn predict(&self, workload: &Workload, _: &Params) -> Cost {
         cost::dais_list(workload)
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
-        let mut lists = Lists::new(graph, frame)?;
-        let mut triangles = Triangles::new(graph, frame)?;
-        let rows = band_rows(frame);
+        let params = frame.params.typed::<DaisListParams>();
+        let mut lists = Lists::new(graph, frame, params.nodes)?;
+        let mut triangles = Triangles::new(graph, frame, params.cache)?;
+        let rows = band_rows(frame, params.bands);
         // Held for one band: the next one draws over it.
         let info = ImageInfo::new(frame.small_depth_stencil_format(), frame.width_px, rows);
         let mut depth = graph.image("dais-list/depth", BufferRole::Depth, info.samples(frame.samples));
@@ -99,7 +86,8 @@ impl Technique for DaisList {
             (depth, lists, triangles) = band.fill(graph, frame, depth, lists, triangles)?;
         }
         frame.watch(graph, "nodes", &lists.node_count, lists.capacity, lists.bounded);
-        let rate = LowRate::chosen(frame, &INFO)?;
+        let rate = LowRate::chosen(frame, INFO.id, params.rate)?;
+        let asked = Asked { technique: INFO.id, lights: params.light_step().method(frame), rate };
         let tag = if frame.tessellate_px.is_some() { "places" } else { "" };
         let source = SurfaceSource { folder: "dais_list", tag, shading_tag: None, samples: frame.samples };
         let stored = triangles.store(graph, frame)?;
@@ -109,7 +97,7 @@ impl Technique for DaisList {
         };
         let surfaces =
             cells::VisibleDepths::of_source((source.folder, tag), frame.samples, |pass| bind(pass));
-        dais::shade(graph, frame, &INFO, rate.as_ref(), (source, &surfaces), stored.records(), &bind)
+        dais::shade(graph, frame, &asked, (source, &surfaces), stored.records(), &bind)
     }
 }
 
@@ -126,9 +114,9 @@ struct Lists {
 
 impl Lists {
     /// Declares empty lists.
-    fn new(graph: &mut Graph, frame: &Frame<'_>) -> Result<Self, TechniqueError> {
+    fn new(graph: &mut Graph, frame: &Frame<'_>, nodes: AutoOr<u32>) -> Result<Self, TechniqueError> {
         let pixels = u64::from(frame.width_px) * u64::from(frame.height_px);
-        let fixed: Option<u32> = frame.params.text(&INFO, NODES.key).parse().ok();
+        let fixed = nodes.fixed();
         let capacity = fixed.unwrap_or_else(|| frame.capacity("nodes", FIRST_GUESS));
         frame.check_binding(INFO.id, "nodes", 8 * u64::from(capacity))?;
         let zeroed = |graph: &mut Graph, name: &str, role: BufferRole, bytes: u64| {
@@ -191,10 +179,10 @@ enum Stored {
 }
 
 impl Triangles {
-    fn new(graph: &mut Graph, frame: &Frame<'_>) -> Result<Self, TechniqueError> {
+    fn new(graph: &mut Graph, frame: &Frame<'_>, cache: CacheParams) -> Result<Self, TechniqueError> {
         let most = references_max(frame.samples);
         if frame.tessellate_px.is_some() {
-            let cache = Cache::new(graph, frame, &INFO);
+            let cache = Cache::new(graph, INFO.id, cache);
             return Ok(Self::Listed { cache, list: triangles::List::new(graph, frame, INFO.id, most)? });
         }
         let triangles = u64::from(DRAW_TRIANGLES) * frame.scene.draw_count() as u64;
@@ -248,11 +236,11 @@ impl Stored {
     }
 }
 
-/// Rows of a band by [`BANDS`]. Tessellated triangles are numbered anew in each pass, which a cache cannot tell apart: one band.
-fn band_rows(frame: &Frame<'_>) -> u32 {
+/// Rows of a band. Tessellated triangles are numbered anew in each pass, which a cache cannot tell apart: one band.
+fn band_rows(frame: &Frame<'_>, bands: u32) -> u32 {
     let bands = match frame.tessellate_px {
         Some(_) => 1,
-        None => frame.params.number(&INFO, BANDS.key) as u32,
+        None => bands,
     };
     frame.height_px.div_ceil(bands).next_multiple_of(BAND_ROWS).min(frame.height_px)
 }
@@ -301,7 +289,7 @@ impl Band {
         lists: Lists,
         triangles: Triangles,
     ) -> Result<(ImageHandle, Lists, Triangles), TechniqueError> {
-        let mut fill = FillPass::new(graph, frame, &INFO, "dais_list/fill.frag", &[])?;
+        let mut fill = FillPass::new(graph, frame, INFO.id, "dais_list/fill.frag", &[])?;
         let surfaces = &mut fill.surfaces;
         (surfaces.stencil, surfaces.stencil_reference) = (Some(FIRST_FRAGMENT), 1);
         surfaces.masked_stencil = Some(NOT_TAKEN);

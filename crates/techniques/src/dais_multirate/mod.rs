@@ -2,16 +2,17 @@
 
 // ORDER: 160
 
+mod params;
+
+pub use params::DaisMultirateParams;
+
 use afterlight_graph::{Graph, ImageHandle};
 
-use crate::dais::{
-    self,
-    low_rate::{LowRate, RATE, SHARE},
-};
+use crate::dais::{self, Asked, LowRate};
 use afterlight_cost::{Cost, Workload};
 use afterlight_frame::{Answers, Exactness, Frame, Info, Params, Source, Technique, TechniqueError, views};
 use afterlight_shader::Shader;
-use afterlight_stages::{lights::step, surfaces::compute_raster};
+use afterlight_stages::lights::step;
 
 /// The technique.
 pub static TECHNIQUE: DaisMultirate = DaisMultirate;
@@ -30,7 +31,7 @@ static INFO: Info = Info {
     ],
     answers: Answers {
         surface: "triangle IDs and a triangle buffer",
-        lights: "loop over all, tiles, clusters, or a tree",
+        lights: step::ANSWER,
         schedule: "compute, a thread a pixel; indirect light a few threads a triangle and cell of pixels",
         resolve: "once a triangle",
     },
@@ -39,20 +40,9 @@ static INFO: Info = Info {
         bound: "indirect light of a cell's pixels is that of their mean place; without --indirect as dais",
         min_psnr_db: 40.0,
     },
-    params: &[
-        step::LIGHTS,
-        RATE,
-        SHARE,
-        dais::FILL,
-        dais::CACHE_BUCKETS,
-        dais::REFERENCE_BITS,
-        compute_raster::VISIBILITY,
-        compute_raster::SMALL,
-    ],
-    needs: &[],
     samples: &[1, 2, 4, 8],
-    tessellation: true,
     views: views::TRIANGLES,
+    ..Info::USUAL
 };
 
 impl Technique for DaisMultirate {
@@ -64,12 +54,18 @@ impl Technique for DaisMultirate {
         &crate::SHADERS
     }
 
+    fn params(&self) -> Params {
+        Params::of(DaisMultirateParams::default())
+    }
+
     fn predict(&self, workload: &Workload, _: &Params) -> Cost {
         crate::dais::cost::dais(workload)
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
-        let rate = LowRate::chosen(frame, &INFO)?;
-        dais::record(graph, frame, &INFO, rate.as_ref())
+        let params = frame.params.typed::<DaisMultirateParams>();
+        let rate = LowRate::chosen(frame, INFO.id, params.rate)?;
+        let asked = Asked { technique: INFO.id, lights: params.light_step().method(frame), rate };
+        dais::record(graph, frame, &asked, (params.fill, params.raster))
     }
 }

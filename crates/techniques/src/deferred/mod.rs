@@ -3,18 +3,22 @@
 // ORDER: 40
 
 pub mod cost;
+mod params;
+
+pub use params::DeferredParams;
 
 use afterlight_graph::{Graph, ImageHandle, Load, PassRole, gpu::vk};
 
 use afterlight_cost::{Cost, Workload};
 use afterlight_frame::{
     Answers, AppendixA, Exactness, Frame, Info, OpaqueDepth, Params, Source, Technique, TechniqueError,
+    params::AutoOr,
 };
 use afterlight_shader::Shader;
 use afterlight_stages::{
     lights::{
         cells::VisibleDepths,
-        step::{self, LightStep},
+        step::{LightMethod, LightStep},
         volumes,
     },
     surfaces::gbuffer,
@@ -47,11 +51,7 @@ static INFO: Info = Info {
         rates_decoupled: "n, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
-    params: &[step::GBUFFER_LIGHTS],
-    needs: &[],
-    samples: &[1],
-    tessellation: true,
-    views: &[],
+    ..Info::USUAL
 };
 
 impl Technique for Deferred {
@@ -63,22 +63,30 @@ impl Technique for Deferred {
         &crate::SHADERS
     }
 
+    fn params(&self) -> Params {
+        Params::of(DeferredParams::default())
+    }
+
     fn predict(&self, workload: &Workload, _: &Params) -> Cost {
         cost::deferred(workload)
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let mut filled = gbuffer::fill(graph, frame, INFO.id, vk::Format::D32_SFLOAT)?;
-        match step::chosen(frame, &INFO) {
-            "volumes" => {}
-            "lists" => {
-                let lists = LightStep::lists(graph, frame, &INFO, &filled.depth)?;
+        match frame.params.typed::<DeferredParams>().light_step().method(frame) {
+            LightMethod::Volumes => {}
+            LightMethod::Lists => {
+                let lists = LightStep::lists(graph, frame, INFO.id, AutoOr::Auto, &filled.depth)?;
                 return gbuffer::shade(graph, frame, INFO.id, filled, &lists);
             }
-            _ => {
-                let surfaces = VisibleDepths::of_depth(&filled.depth, 1);
-                let step = LightStep::build(graph, frame, &INFO, &surfaces)?;
-                drop(surfaces);
+            method @ (LightMethod::All | LightMethod::Cells(_) | LightMethod::Tree) => {
+                let step = LightStep::build(
+                    graph,
+                    frame,
+                    INFO.id,
+                    method,
+                    &VisibleDepths::of_depth(&filled.depth, 1),
+                )?;
                 return gbuffer::shade(graph, frame, INFO.id, filled, &step);
             }
         }

@@ -13,7 +13,7 @@ use afterlight_frame::{
 };
 use afterlight_shader::Shader;
 use afterlight_stages::{
-    lights::step,
+    lights::step::{self, StepParams},
     surfaces::shade,
     surfaces::{
         geometry::SceneDraws,
@@ -36,7 +36,7 @@ static INFO: Info = Info {
     sources: &[Source { key: "schied-2015", section: "5" }],
     answers: Answers {
         surface: "G-buffer, MSAA with triangle IDs",
-        lights: "loop over all, tiles, clusters, or a tree",
+        lights: step::ANSWER,
         schedule: "compute, a thread a pixel",
         resolve: "once a triangle",
     },
@@ -50,11 +50,10 @@ static INFO: Info = Info {
         rates_decoupled: "n, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
-    params: &[step::LIGHTS],
     needs: &[samples::STANDARD_LOCATIONS],
     samples: MULTIPLE_SAMPLES,
-    tessellation: true,
     views: shade::VIEWS,
+    ..Info::USUAL
 };
 
 impl Technique for DeferredDedup {
@@ -66,21 +65,27 @@ impl Technique for DeferredDedup {
         &crate::SHADERS
     }
 
+    fn params(&self) -> Params {
+        Params::of(StepParams::default())
+    }
+
     fn predict(&self, workload: &Workload, _: &Params) -> Cost {
         cost::deferred_dedup(workload)
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let filled = fill(graph, frame)?;
-        let surfaces = filled.surfaces(frame);
+        let lights = frame.params.typed::<StepParams>().light_step().method(frame);
         let source = SurfaceSource {
             folder: "deferred_dedup",
             tag: "",
             shading_tag: emission_tag(frame),
             samples: frame.samples,
         };
-        let radiance = shade::shade(graph, frame, &INFO, source, &surfaces, &|pass| filled.bind(pass))?;
-        drop(surfaces);
+        let radiance =
+            shade::shade(graph, frame, (INFO.id, lights), source, &filled.surfaces(frame), &|pass| {
+                filled.bind(pass)
+            })?;
         frame.board.put(OpaqueDepth(filled.depth));
         Ok(radiance)
     }

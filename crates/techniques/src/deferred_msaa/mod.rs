@@ -16,7 +16,7 @@ use afterlight_frame::{
 };
 use afterlight_shader::Shader;
 use afterlight_stages::{
-    lights::step,
+    lights::step::{self, LightMethod, StepParams},
     surfaces::samples::{SampleBuffer, emission_variant},
     surfaces::shade,
     surfaces::{
@@ -41,7 +41,7 @@ static INFO: Info = Info {
     ],
     answers: Answers {
         surface: "G-buffer, multisampled",
-        lights: "loop over all, tiles, clusters, or a tree",
+        lights: step::ANSWER,
         schedule: "fragment shader; compute with lists of lights",
         resolve: "edges only",
     },
@@ -55,11 +55,10 @@ static INFO: Info = Info {
         rates_decoupled: "n, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
-    params: &[step::LIGHTS],
     needs: &[samples::STANDARD_LOCATIONS],
     samples: MULTIPLE_SAMPLES,
-    tessellation: true,
     views: shade::VIEWS,
+    ..Info::USUAL
 };
 
 /// Writes the reference wherever a fragment is.
@@ -81,15 +80,22 @@ impl Technique for DeferredMsaa {
         &crate::SHADERS
     }
 
+    fn params(&self) -> Params {
+        Params::of(StepParams::default())
+    }
+
     fn predict(&self, workload: &Workload, _: &Params) -> Cost {
         cost::deferred_msaa(workload)
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let filled = samples::fill_samples(graph, frame, "deferred-msaa")?;
-        let radiance = match step::chosen(frame, &INFO) {
-            "all" => shade_by_stencil(graph, frame, &filled)?,
-            _ => {
+        let radiance = match frame.params.typed::<StepParams>().light_step().method(frame) {
+            LightMethod::All => shade_by_stencil(graph, frame, &filled)?,
+            lights @ (LightMethod::Volumes
+            | LightMethod::Lists
+            | LightMethod::Cells(_)
+            | LightMethod::Tree) => {
                 let surfaces = filled.surfaces(frame);
                 let source = SurfaceSource {
                     folder: "deferred_msaa",
@@ -97,7 +103,9 @@ impl Technique for DeferredMsaa {
                     shading_tag: emission_tag(frame),
                     samples: frame.samples,
                 };
-                shade::shade(graph, frame, &INFO, source, &surfaces, &|pass| filled.bind(pass))?
+                shade::shade(graph, frame, (INFO.id, lights), source, &surfaces, &|pass| {
+                    filled.bind(pass);
+                })?
             }
         };
         frame.board.put(OpaqueDepth(filled.depth));

@@ -11,7 +11,7 @@ use afterlight_frame::{
 };
 use afterlight_shader::Shader;
 use afterlight_stages::{
-    lights::step,
+    lights::step::{self, StepParams},
     surfaces::shade,
     surfaces::{
         samples::{self, emission_tag},
@@ -35,7 +35,7 @@ static INFO: Info = Info {
     ],
     answers: Answers {
         surface: "G-buffer, multisampled",
-        lights: "loop over all, tiles, clusters, or a tree",
+        lights: step::ANSWER,
         schedule: "compute, a thread a pixel",
         resolve: "shade all samples",
     },
@@ -49,11 +49,10 @@ static INFO: Info = Info {
         rates_decoupled: "n, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
-    params: &[step::LIGHTS],
     needs: &[samples::STANDARD_LOCATIONS],
     samples: MULTIPLE_SAMPLES,
-    tessellation: true,
     views: shade::VIEWS,
+    ..Info::USUAL
 };
 
 impl Technique for DeferredSsaa {
@@ -65,21 +64,27 @@ impl Technique for DeferredSsaa {
         &crate::SHADERS
     }
 
+    fn params(&self) -> Params {
+        Params::of(StepParams::default())
+    }
+
     fn predict(&self, workload: &Workload, _: &Params) -> Cost {
         crate::deferred_msaa::cost::deferred_msaa(workload)
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let filled = samples::fill_samples(graph, frame, "deferred-ssaa")?;
-        let surfaces = filled.surfaces(frame);
+        let lights = frame.params.typed::<StepParams>().light_step().method(frame);
         let source = SurfaceSource {
             folder: "deferred_ssaa",
             tag: "",
             shading_tag: emission_tag(frame),
             samples: frame.samples,
         };
-        let radiance = shade::shade(graph, frame, &INFO, source, &surfaces, &|pass| filled.bind(pass))?;
-        drop(surfaces);
+        let radiance =
+            shade::shade(graph, frame, (INFO.id, lights), source, &filled.surfaces(frame), &|pass| {
+                filled.bind(pass)
+            })?;
         frame.board.put(OpaqueDepth(filled.depth));
         Ok(radiance)
     }

@@ -43,11 +43,7 @@ static INFO: Info = Info {
         rates_decoupled: "n, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
-    params: &[],
-    needs: &[],
-    samples: &[1],
-    tessellation: true,
-    views: &[],
+    ..Info::USUAL
 };
 
 /// Marks surfaces inside a closed volume, the eye inside or outside: faces behind the surface count, back faces up and
@@ -78,11 +74,11 @@ impl Technique for DeferredStencil {
         &INFO
     }
 
-    /// As deferred, with two draws a light, the volumes' vertices processed twice.
     fn shaders(&self) -> &[Shader] {
         &crate::SHADERS
     }
 
+    /// As deferred, with two draws a light, the volumes' vertices processed twice.
     fn predict(&self, workload: &Workload, _: &Params) -> Cost {
         let twice = Workload {
             light_command: 2.0 * workload.light_command,

@@ -4,9 +4,7 @@
 
 pub mod cost;
 
-use afterlight_graph::{
-    BufferRole, DepthTest, Graph, ImageHandle, Load, PassRole, RasterPass, StencilFace, StencilTest, gpu::vk,
-};
+use afterlight_graph::{DepthTest, Graph, ImageHandle, Load, PassRole};
 
 use afterlight_cost::{Cost, Workload};
 use afterlight_frame::{
@@ -16,7 +14,7 @@ use afterlight_frame::{
 use afterlight_shader::Shader;
 use afterlight_stages::{
     surfaces::depth_first::{FIRST_FRAGMENT, draw_depth},
-    surfaces::{RadianceTarget, depth_first::shaded_surfaces, geometry::SceneDraws},
+    surfaces::{RadianceTarget, depth_first::shaded_surfaces},
     views::InvocationCount,
 };
 
@@ -47,11 +45,9 @@ static INFO: Info = Info {
         rates_decoupled: "n, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
-    params: &[],
-    needs: &[],
     samples: ANY_SAMPLES,
-    tessellation: true,
     views: &["invocations"],
+    ..Info::USUAL
 };
 
 impl Technique for DepthPrepass {

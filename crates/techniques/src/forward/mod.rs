@@ -13,9 +13,7 @@ use afterlight_frame::{
 };
 use afterlight_shader::Shader;
 use afterlight_stages::{
-    surfaces::depth_first::shaded_surfaces,
-    surfaces::{RadianceTarget, geometry::SceneDraws},
-    views::InvocationCount,
+    surfaces::RadianceTarget, surfaces::depth_first::shaded_surfaces, views::InvocationCount,
 };
 
 /// The technique.
@@ -45,11 +43,9 @@ static INFO: Info = Info {
         rates_decoupled: "n, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
-    params: &[],
-    needs: &[],
     samples: ANY_SAMPLES,
-    tessellation: true,
     views: &["invocations"],
+    ..Info::USUAL
 };
 
 impl Technique for Forward {

@@ -2,16 +2,20 @@
 
 // ORDER: 20
 
+mod params;
+
+pub use params::{ForwardMultipassParams, Scissor};
+
 use afterlight_graph::{
     Blend, BufferRole, DepthTest, Graph, ImageHandle, Load, PassRole, RasterPass, Rect, gpu::vk,
 };
 use afterlight_scene::Aabb;
-use glam::{Mat4, Vec3};
+use glam::Vec3;
 
 use afterlight_cost::{Cost, Workload};
 use afterlight_frame::{
-    Answers, AppendixA, Exactness, Frame, Info, OpaqueDepth, ParamInfo, ParamKind, Params, Source, Technique,
-    TechniqueError, camera_view::screen_rect,
+    Answers, AppendixA, Exactness, Frame, Info, OpaqueDepth, Params, Source, Technique, TechniqueError,
+    camera_view::screen_rect,
 };
 use afterlight_shader::Shader;
 use afterlight_stages::surfaces::{depth_first::FIRST_FRAGMENT, geometry::SceneDraws};
@@ -21,13 +25,6 @@ pub static TECHNIQUE: ForwardMultipass = ForwardMultipass;
 
 /// See the module.
 pub struct ForwardMultipass;
-
-static SCISSOR: ParamInfo = ParamInfo {
-    key: "scissor",
-    summary: "a light's pass covers the light's bounds on the image, or all of it",
-    kind: ParamKind::Choice { values: &["light", "none"] },
-    default: "light",
-};
 
 static INFO: Info = Info {
     id: "forward-multipass",
@@ -50,11 +47,7 @@ static INFO: Info = Info {
         rates_decoupled: "n, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
-    params: &[SCISSOR],
-    needs: &[],
-    samples: &[1],
-    tessellation: true,
-    views: &[],
+    ..Info::USUAL
 };
 
 /// Passes between two clears of the stencil: each has a reference of its own, from 1 to 255.
@@ -67,6 +60,10 @@ impl Technique for ForwardMultipass {
 
     fn shaders(&self) -> &[Shader] {
         &crate::SHADERS
+    }
+
+    fn params(&self) -> Params {
+        Params::of(ForwardMultipassParams::default())
     }
 
     fn predict(&self, workload: &Workload, _: &Params) -> Cost {
@@ -117,7 +114,7 @@ fn draw_lights(frame: &Frame<'_>, pass: &mut RasterPass<'_>) -> Result<(), Techn
             .stencil(FIRST_FRAGMENT, 1)
             .blend(vec![Blend::ADD]);
     let whole = Rect { x_px: 0, y_px: 0, width_px: frame.width_px, height_px: frame.height_px };
-    let by_light = frame.params.get(&SCISSOR) == "light";
+    let by_light = frame.params.typed::<ForwardMultipassParams>().scissor == Scissor::Light;
     for index in 0..frame.lights.count {
         if index > 0 && index % STENCIL_REFERENCES == 0 {
             pass.clear_stencil(0, None);

@@ -3,24 +3,24 @@
 // ORDER: 130
 
 mod filter;
+mod params;
+
+pub use params::{Fill, Filter, FilterParams, GbufferListParams, Pointer, Position, Region};
 
 pub mod cost;
 
-use afterlight_graph::{
-    BufferHandle, BufferRole, DepthTest, Graph, ImageHandle, Load, PassRole, StencilFace, StencilTest,
-    gpu::vk,
-};
+use afterlight_graph::{BufferHandle, BufferRole, DepthTest, Graph, ImageHandle, Load, PassRole};
 
 use afterlight_cost::{Cost, Workload};
 use afterlight_frame::{
-    ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, OpaqueDepth, ParamInfo, ParamKind, Params,
-    Source, Technique, TechniqueError,
+    ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, OpaqueDepth, Params, Source, Technique,
+    TechniqueError, params::Words, set_constants,
 };
 use afterlight_shader::Shader;
 use afterlight_stages::{
     lights::{cells, step},
     surfaces::claims::{NOT_TAKEN, claims},
-    surfaces::{compute_raster, depth_first::FIRST_FRAGMENT, geometry::SceneDraws, shade, visible::Visible},
+    surfaces::{depth_first::FIRST_FRAGMENT, geometry::SceneDraws, shade, visible::Visible},
     surfaces::{samples, shade::SurfaceSource},
 };
 
@@ -30,31 +30,6 @@ pub static TECHNIQUE: GbufferList = GbufferList;
 /// See the module.
 pub struct GbufferList;
 
-const FILL: ParamInfo = ParamInfo {
-    key: "fill",
-    summary: "who builds the lists: compute over a multisampled visibility buffer, or a second raster pass after a depth pre-pass (the paper's)",
-    kind: ParamKind::Choice { values: &["compute", "raster"] },
-    default: "compute",
-};
-const BLOCKS: ParamInfo = ParamInfo {
-    key: "blocks",
-    summary: "dynamic blocks; auto: as many as the view needs, counted; fixed: what finds none is dropped and told",
-    kind: ParamKind::AutoOrInteger { min: 0, max: u32::MAX },
-    default: "auto",
-};
-const POINTER: ParamInfo = ParamInfo {
-    key: "pointer",
-    summary: "narrow: 26 bits of index and 3 + 3 of coverage, up to 8 samples and 2^26 blocks; wide: 64 bits; auto: narrow where it suffices",
-    kind: ParamKind::Choice { values: &["auto", "narrow", "wide"] },
-    default: "auto",
-};
-const POSITION: ParamInfo = ParamInfo {
-    key: "position",
-    summary: "where a block's position comes from: the depth buffer at one of its samples (the paper's), or a distance in the block, 32 bits more, exact at the pixel's centre",
-    kind: ParamKind::Choice { values: &["distance", "depth"] },
-    default: "distance",
-};
-
 static INFO: Info = Info {
     id: "gbuffer-list",
     title: "G-buffer of per-pixel lists",
@@ -62,7 +37,7 @@ static INFO: Info = Info {
     sources: &[Source { key: "fridvalszky-2020", section: "3 to 5" }],
     answers: Answers {
         surface: "G-buffer, per-pixel lists",
-        lights: "loop over all, tiles, clusters, or a tree",
+        lights: step::ANSWER,
         schedule: "compute, a thread a pixel",
         resolve: "once a triangle, weighted by coverage",
     },
@@ -77,28 +52,11 @@ static INFO: Info = Info {
     },
     // Texture gradients are analytic where compute fills.
     exactness: Exactness::Exact { min_psnr_db: 45.0 },
-    params: &[
-        step::LIGHTS,
-        FILL,
-        compute_raster::VISIBILITY,
-        compute_raster::SMALL,
-        BLOCKS,
-        POINTER,
-        POSITION,
-        filter::FILTER,
-        filter::REGION,
-        filter::LEFT,
-        filter::TOP,
-        filter::RIGHT,
-        filter::BOTTOM,
-        filter::DEPTH_THRESHOLD,
-        filter::OBJECTS,
-        filter::EDGE_THRESHOLD,
-    ],
     needs: &[samples::STANDARD_LOCATIONS],
     samples: ANY_SAMPLES,
     tessellation: false,
     views: shade::VIEWS,
+    ..Info::USUAL
 };
 
 /// Most blocks that a narrow pointer tells apart: 26 bits of index.
@@ -126,18 +84,17 @@ struct Layout {
 }
 
 impl Layout {
-    fn new(frame: &Frame<'_>) -> Result<Self, TechniqueError> {
-        let params = frame.params;
+    fn new(frame: &Frame<'_>, params: &GbufferListParams) -> Result<Self, TechniqueError> {
         let pixels = u64::from(frame.width_px) * u64::from(frame.height_px);
-        let fixed: Option<u32> = params.text(&INFO, BLOCKS.key).parse().ok();
+        let fixed = params.blocks.fixed();
         let first_guess = u32::try_from(pixels / u64::from(FIRST_GUESS_PIXELS)).unwrap_or(u32::MAX);
         let capacity = fixed.unwrap_or_else(|| frame.capacity("blocks", first_guess));
         let blocks = pixels + u64::from(capacity);
-        let by_compute = params.text(&INFO, FILL.key) == "compute";
+        let by_compute = params.fill == Fill::Compute;
         let samples = if capacity == 0 && fixed.is_some() && by_compute { 1 } else { frame.samples };
         let narrow = blocks <= NARROW_BLOCKS_MAX && samples <= NARROW_SAMPLES_MAX;
-        let pointer_words = match (params.text(&INFO, POINTER.key), narrow) {
-            ("narrow", false) => {
+        let pointer_words = match (params.pointer, narrow) {
+            (Pointer::Narrow, false) => {
                 return Err(TechniqueError::Conflict {
                     technique: INFO.id,
                     found: format!("pointer=narrow with {samples} samples and {blocks} blocks"),
@@ -146,10 +103,10 @@ impl Layout {
                     ),
                 });
             }
-            ("wide", _) | (_, false) => 2,
-            _ => 1,
+            (Pointer::Wide, _) | (Pointer::Auto, false) => 2,
+            (Pointer::Auto | Pointer::Narrow, true) => 1,
         };
-        let in_block = params.text(&INFO, POSITION.key) == "distance";
+        let in_block = params.position == Position::Distance;
         Ok(Self {
             samples,
             capacity,
@@ -157,7 +114,7 @@ impl Layout {
             pointer_words,
             distance_words: u32::from(in_block),
             emission_words: u32::from(frame.scene.has_emission),
-            keeps_all: fixed.is_none() && filter::bits(&INFO, params) == 0,
+            keeps_all: fixed.is_none() && params.filter.filters == Words::NONE,
             blocks,
         })
     }
@@ -207,6 +164,16 @@ enum Samples {
     Keys(BufferHandle),
 }
 
+impl Samples {
+    /// Where the surfaces stand.
+    fn surfaces(&self, samples: u32) -> cells::VisibleDepths<'_> {
+        match self {
+            Self::Keys(keys) => cells::VisibleDepths::of_keys(keys, samples),
+            Self::Depth(depth) => cells::VisibleDepths::of_depth(depth, samples),
+        }
+    }
+}
+
 impl Technique for GbufferList {
     fn info(&self) -> &Info {
         &INFO
@@ -216,15 +183,20 @@ impl Technique for GbufferList {
         &crate::SHADERS
     }
 
+    fn params(&self) -> Params {
+        Params::of(GbufferListParams::default())
+    }
+
     fn predict(&self, workload: &Workload, params: &Params) -> Cost {
-        cost::gbuffer_list(workload, params.text(&INFO, FILL.key) == "compute")
+        cost::gbuffer_list(workload, params.typed::<GbufferListParams>().fill == Fill::Compute)
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
-        let layout = Layout::new(frame)?;
-        let lists = match frame.params.text(&INFO, FILL.key) {
-            "raster" => fill_by_raster(graph, frame, &layout)?,
-            _ => fill_by_compute(graph, frame, &layout)?,
+        let params = frame.params.typed::<GbufferListParams>();
+        let layout = Layout::new(frame, params)?;
+        let lists = match params.fill {
+            Fill::Raster => fill_by_raster(graph, frame, &layout, &params.filter)?,
+            Fill::Compute => fill_by_compute(graph, frame, &layout, params)?,
         };
         frame.watch(graph, "blocks", &lists.count, layout.capacity, layout.is_fixed);
         let tag = match &lists.samples {
@@ -232,20 +204,14 @@ impl Technique for GbufferList {
             Samples::Depth(_) if layout.samples == 1 => "one",
             Samples::Depth(_) => "",
         };
-        let surfaces = match &lists.samples {
-            Samples::Keys(keys) => cells::VisibleDepths::of_keys(keys, layout.samples),
-            Samples::Depth(depth) => cells::VisibleDepths::of_depth(depth, layout.samples),
-        };
         let radiance = shade::shade(
             graph,
             frame,
-            &INFO,
+            (INFO.id, params.light_step().method(frame)),
             SurfaceSource { folder: "gbuffer_list", tag, shading_tag: None, samples: layout.samples },
-            &surfaces,
+            &lists.samples.surfaces(layout.samples),
             &|pass| {
-                for (name, value) in layout.constants() {
-                    pass.constant(name, value);
-                }
+                set_constants(pass, layout.constants());
                 pass.constant("KEEPS_ALL", u32::from(layout.keeps_all));
                 pass.read_buffer("Blocks", &lists.blocks);
                 match &lists.samples {
@@ -254,7 +220,6 @@ impl Technique for GbufferList {
                 }
             },
         )?;
-        drop(surfaces);
         if let Samples::Depth(depth) = lists.samples {
             frame.board.put(OpaqueDepth(depth));
         }
@@ -267,10 +232,10 @@ fn empty_lists(
     graph: &mut Graph,
     frame: &Frame<'_>,
     layout: &Layout,
+    objects: &str,
 ) -> Result<(BufferHandle, BufferHandle, BufferHandle), TechniqueError> {
     let blocks = graph.buffer("gbuffer-list/blocks", BufferRole::SurfaceListNodes, layout.bytes(frame)?);
     let count = graph.buffer("gbuffer-list/block count", BufferRole::SurfaceListNodes, 8);
-    let objects = frame.params.text(&INFO, filter::OBJECTS.key);
     let flagged = frame.table(
         graph,
         "gbuffer-list/flagged draws",
@@ -283,8 +248,8 @@ fn empty_lists(
 }
 
 /// Specialization constants of shaders that build the lists.
-fn build_constants(frame: &Frame<'_>, layout: &Layout) -> Vec<(String, u32)> {
-    let mut all = filter::constants(&INFO, frame.params);
+fn build_constants(layout: &Layout, filter: &FilterParams) -> Vec<(String, u32)> {
+    let mut all = filter::constants(filter);
     all.extend(layout.constants().map(|(name, value)| (name.to_owned(), value)));
     all.push(("SAMPLES".to_owned(), layout.samples));
     all.push(("BLOCK_CAPACITY".to_owned(), layout.capacity));
@@ -292,14 +257,17 @@ fn build_constants(frame: &Frame<'_>, layout: &Layout) -> Vec<(String, u32)> {
 }
 
 /// The triangle of every sample, then a thread a pixel that writes its list.
-fn fill_by_compute(graph: &mut Graph, frame: &Frame<'_>, layout: &Layout) -> Result<Lists, TechniqueError> {
-    let visible = Visible::find(graph, frame, &INFO, layout.samples)?;
-    let (blocks, count, flagged) = empty_lists(graph, frame, layout)?;
+fn fill_by_compute(
+    graph: &mut Graph,
+    frame: &Frame<'_>,
+    layout: &Layout,
+    params: &GbufferListParams,
+) -> Result<Lists, TechniqueError> {
+    let visible = Visible::find(graph, frame, INFO.id, params.raster, layout.samples)?;
+    let (blocks, count, flagged) = empty_lists(graph, frame, layout, &params.filter.objects)?;
     let shader = frame.shader(&format!("gbuffer_list/fill.comp{}", visible.tag('#')))?;
     let mut pass = frame.compute(graph, "gbuffer-list/fill", PassRole::Geometry, &shader);
-    for (name, value) in build_constants(frame, layout) {
-        pass.constant(&name, value);
-    }
+    set_constants(&mut pass, build_constants(layout, &params.filter));
     visible.bind(frame, &mut pass);
     pass.read("SingleSampleDraws", &flagged);
     let blocks = pass.write("Blocks", blocks);
@@ -314,14 +282,19 @@ fn fill_by_compute(graph: &mut Graph, frame: &Frame<'_>, layout: &Layout) -> Res
 }
 
 /// A depth pre-pass, then fragments that write themselves where they show (the paper's section 3).
-fn fill_by_raster(graph: &mut Graph, frame: &Frame<'_>, layout: &Layout) -> Result<Lists, TechniqueError> {
+fn fill_by_raster(
+    graph: &mut Graph,
+    frame: &Frame<'_>,
+    layout: &Layout,
+    filter: &FilterParams,
+) -> Result<Lists, TechniqueError> {
     if !frame.features().post_depth_coverage {
         return Err(TechniqueError::Unavailable {
             technique: INFO.id,
             missing: "post-depth coverage for fill=raster (fill=compute does without)".to_owned(),
         });
     }
-    if filter::bits(&INFO, frame.params) & filter::EDGES != 0 {
+    if filter.filters.contains(Filter::Edges) {
         return Err(TechniqueError::Conflict {
             technique: INFO.id,
             found: "filter=edges with fill=raster, where a fragment does not know the other surfaces of its pixel".to_owned(),
@@ -344,8 +317,8 @@ fn fill_by_raster(graph: &mut Graph, frame: &Frame<'_>, layout: &Layout) -> Resu
         .stencil(FIRST_FRAGMENT, 1);
     // Masked surfaces keep off what opaque ones have, and share the rest by claims.
     fill.masked_stencil = Some(NOT_TAKEN);
-    fill.constants = build_constants(frame, layout);
-    let (blocks, count, flagged) = empty_lists(graph, frame, layout)?;
+    fill.constants = build_constants(layout, filter);
+    let (blocks, count, flagged) = empty_lists(graph, frame, layout, &filter.objects)?;
     let claims = claims(graph, frame, INFO.id, layout.samples);
 
     let depth = depth_only.fill_depth(graph, frame, ("gbuffer-list/depth", PassRole::DepthPrepass), depth);

@@ -12,8 +12,7 @@ use afterlight_graph::{
 use crate::light_prepass::{self, SUMS};
 use afterlight_cost::{Cost, Workload};
 use afterlight_frame::{
-    Answers, AppendixA, Exactness, Frame, Info, Need, ParamInfo, ParamKind, Params, Source, Technique,
-    TechniqueError,
+    Answers, AppendixA, Exactness, Frame, Info, Need, Params, Source, Technique, TechniqueError,
 };
 use afterlight_shader::Shader;
 use afterlight_stages::surfaces::{
@@ -24,29 +23,16 @@ use afterlight_stages::surfaces::{
 };
 use paths::{Path, Run};
 
+mod params;
 mod paths;
+
+pub use params::{HybridParams, PathChoice};
 
 /// The technique.
 pub static TECHNIQUE: Hybrid = Hybrid;
 
 /// See the module.
 pub struct Hybrid;
-
-/// Which path draws take.
-const PATH: ParamInfo = ParamInfo {
-    key: "path",
-    summary: "path of each draw: the one that is predicted to read and write less, or one for all",
-    kind: ParamKind::Choice { values: &["predicted", "deferred", "prepass"] },
-    default: "predicted",
-};
-
-/// Bias of the choice.
-const PREPASS_WEIGHT: ParamInfo = ParamInfo {
-    key: "prepass-weight",
-    summary: "factor on the traffic that is predicted for a draw on the light pre-pass path: below 1 more draws take it",
-    kind: ParamKind::Number { min: 0.0, max: 1000.0 },
-    default: "1",
-};
 
 static INFO: Info = Info {
     id: "hybrid",
@@ -73,11 +59,8 @@ static INFO: Info = Info {
         rates_decoupled: "n, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
-    params: &[PATH, PREPASS_WEIGHT],
     needs: &[Need { name: "independent blending", test: |features| features.independent_blend }],
-    samples: &[1],
-    tessellation: true,
-    views: &[],
+    ..Info::USUAL
 };
 
 /// Names the owner of a pixel: the stencil reference of what is nearest so far.
@@ -134,27 +117,32 @@ impl Technique for Hybrid {
         &INFO
     }
 
-    /// The model's objects are alike, so all take the path that reads and writes less.
     fn shaders(&self) -> &[Shader] {
         &crate::SHADERS
     }
 
+    fn params(&self) -> Params {
+        Params::of(HybridParams::default())
+    }
+
+    /// The model's objects are alike, so all take the path that reads and writes less.
     fn predict(&self, workload: &Workload, params: &Params) -> Cost {
         let [deferred, prepass] = [0.0, 1.0].map(|share| cost::hybrid(workload, share));
-        let weight = f64::from(params.get(&PREPASS_WEIGHT).parse::<f32>().unwrap_or(1.0));
-        match params.get(&PATH) {
-            "deferred" => deferred,
-            "prepass" => prepass,
-            _ if prepass.band * weight < deferred.band => prepass,
-            _ => deferred,
+        let HybridParams { path, prepass_weight } = *params.typed();
+        match path {
+            PathChoice::Deferred => deferred,
+            PathChoice::Prepass => prepass,
+            PathChoice::Predicted if prepass.band * f64::from(prepass_weight) < deferred.band => prepass,
+            PathChoice::Predicted => deferred,
         }
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
-        let runs = match frame.params.get(&PATH) {
-            "deferred" => paths::one_path(frame, Path::Deferred),
-            "prepass" => paths::one_path(frame, Path::Prepass),
-            _ => paths::predicted(frame, frame.params.number(&INFO, PREPASS_WEIGHT.key)),
+        let HybridParams { path, prepass_weight } = *frame.params.typed();
+        let runs = match path {
+            PathChoice::Deferred => paths::one_path(frame, Path::Deferred),
+            PathChoice::Prepass => paths::one_path(frame, Path::Prepass),
+            PathChoice::Predicted => paths::predicted(frame, prepass_weight),
         };
         let lengths: Vec<u32> = runs.iter().map(|run| run.places.len() as u32).collect();
         let counts = frame.table(graph, "hybrid draw counts", BufferRole::Scene, &lengths)?;

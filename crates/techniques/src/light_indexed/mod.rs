@@ -9,7 +9,10 @@ use afterlight_graph::{Graph, ImageHandle, gpu::vk};
 use afterlight_cost::{Cost, Workload};
 use afterlight_frame::{Answers, AppendixA, Frame, Info, Params, Source, Technique, TechniqueError};
 use afterlight_shader::Shader;
-use afterlight_stages::{lights::indices, surfaces::gbuffer};
+use afterlight_stages::{
+    lights::indices::{self, LightIndexParams},
+    surfaces::gbuffer,
+};
 
 /// The technique.
 pub static TECHNIQUE: LightIndexed = LightIndexed;
@@ -42,11 +45,7 @@ static INFO: Info = Info {
         rates_decoupled: "n, n",
     },
     exactness: indices::EXACTNESS,
-    params: &[indices::INDEX_PARTS],
-    needs: &[],
-    samples: &[1],
-    tessellation: true,
-    views: &[],
+    ..Info::USUAL
 };
 
 impl Technique for LightIndexed {
@@ -58,13 +57,17 @@ impl Technique for LightIndexed {
         &crate::SHADERS
     }
 
+    fn params(&self) -> Params {
+        Params::of(LightIndexParams::default())
+    }
+
     fn predict(&self, workload: &Workload, params: &Params) -> Cost {
-        cost::light_indexed(workload, indices::floats(workload, params, &INFO))
+        cost::light_indexed(workload, indices::floats(workload, *params.typed()))
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let filled = gbuffer::fill(graph, frame, INFO.id, vk::Format::D32_SFLOAT)?;
-        let lights = indices::build(graph, frame, &INFO, &filled.depth)?;
+        let lights = indices::build(graph, frame, INFO.id, *frame.params.typed(), &filled.depth)?;
         gbuffer::shade_by(graph, frame, (INFO.id, "light_indexed/shade.comp"), filled, |pass| {
             lights.bind(pass);
             let (constant, value) = lights.constant();

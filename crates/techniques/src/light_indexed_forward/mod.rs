@@ -10,7 +10,7 @@ use afterlight_cost::{Cost, Workload};
 use afterlight_frame::{Answers, AppendixA, Frame, Info, Params, Source, Technique, TechniqueError};
 use afterlight_shader::Shader;
 use afterlight_stages::{
-    lights::indices,
+    lights::indices::{self, LightIndexParams},
     surfaces::depth_first::{draw_depth, shade_visible},
 };
 
@@ -45,11 +45,7 @@ static INFO: Info = Info {
         rates_decoupled: "n, n",
     },
     exactness: indices::EXACTNESS,
-    params: &[indices::INDEX_PARTS],
-    needs: &[],
-    samples: &[1],
-    tessellation: true,
-    views: &[],
+    ..Info::USUAL
 };
 
 impl Technique for LightIndexedForward {
@@ -61,13 +57,17 @@ impl Technique for LightIndexedForward {
         &crate::SHADERS
     }
 
+    fn params(&self) -> Params {
+        Params::of(LightIndexParams::default())
+    }
+
     fn predict(&self, workload: &Workload, params: &Params) -> Cost {
-        cost::light_indexed_forward(workload, indices::floats(workload, params, &INFO))
+        cost::light_indexed_forward(workload, indices::floats(workload, *params.typed()))
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let depth = draw_depth(graph, frame, INFO.id)?;
-        let lights = indices::build(graph, frame, &INFO, &depth)?;
+        let lights = indices::build(graph, frame, INFO.id, *frame.params.typed(), &depth)?;
         let (name, images) = lights.constant();
         let constants = vec![(name.to_owned(), images)];
         let shader = (INFO.id, "light_indexed_forward/forward.frag");

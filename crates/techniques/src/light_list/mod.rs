@@ -12,15 +12,18 @@ use afterlight_frame::{
 };
 use afterlight_shader::Shader;
 use afterlight_stages::{
-    lights::{pixel_lists, step::LightStep},
+    lights::{
+        pixel_lists::{self, LightListParams},
+        step::LightStep,
+    },
     surfaces::gbuffer,
 };
 
 /// The technique.
-pub static TECHNIQUE: SceneLights = SceneLights;
+pub static TECHNIQUE: LightList = LightList;
 
 /// See the module.
-pub struct SceneLights;
+pub struct LightList;
 
 static INFO: Info = Info {
     id: "light-list",
@@ -46,14 +49,10 @@ static INFO: Info = Info {
         rates_decoupled: "n, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
-    params: &[pixel_lists::NODES],
-    needs: &[],
-    samples: &[1],
-    tessellation: true,
-    views: &[],
+    ..Info::USUAL
 };
 
-impl Technique for SceneLights {
+impl Technique for LightList {
     fn info(&self) -> &Info {
         &INFO
     }
@@ -62,13 +61,18 @@ impl Technique for SceneLights {
         &crate::SHADERS
     }
 
+    fn params(&self) -> Params {
+        Params::of(LightListParams::default())
+    }
+
     fn predict(&self, workload: &Workload, _: &Params) -> Cost {
         cost::light_list(&pixel_lists::with_lists(workload))
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
+        let nodes = frame.params.typed::<LightListParams>().nodes;
         let filled = gbuffer::fill(graph, frame, INFO.id, vk::Format::D32_SFLOAT)?;
-        let lists = LightStep::lists(graph, frame, &INFO, &filled.depth)?;
+        let lists = LightStep::lists(graph, frame, INFO.id, nodes, &filled.depth)?;
         gbuffer::shade(graph, frame, INFO.id, filled, &lists)
     }
 }

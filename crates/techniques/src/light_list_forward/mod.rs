@@ -12,7 +12,10 @@ use afterlight_frame::{
 };
 use afterlight_shader::Shader;
 use afterlight_stages::{
-    lights::{pixel_lists, step::LightStep},
+    lights::{
+        pixel_lists::{self, LightListParams},
+        step::LightStep,
+    },
     surfaces::depth_first::{draw_depth, shade_forward},
 };
 
@@ -46,11 +49,8 @@ static INFO: Info = Info {
         rates_decoupled: "n, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
-    params: &[pixel_lists::NODES],
-    needs: &[],
     samples: ANY_SAMPLES,
-    tessellation: true,
-    views: &[],
+    ..Info::USUAL
 };
 
 impl Technique for LightListForward {
@@ -62,13 +62,18 @@ impl Technique for LightListForward {
         &crate::SHADERS
     }
 
+    fn params(&self) -> Params {
+        Params::of(LightListParams::default())
+    }
+
     fn predict(&self, workload: &Workload, _: &Params) -> Cost {
         cost::light_list_forward(&pixel_lists::with_lists(workload))
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
+        let nodes = frame.params.typed::<LightListParams>().nodes;
         let depth = draw_depth(graph, frame, INFO.id)?;
-        let lists = LightStep::lists(graph, frame, &INFO, &depth)?;
+        let lists = LightStep::lists(graph, frame, INFO.id, nodes, &depth)?;
         shade_forward(graph, frame, INFO.id, depth, &lists)
     }
 }

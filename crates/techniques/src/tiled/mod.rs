@@ -40,11 +40,7 @@ static INFO: Info = Info {
         rates_decoupled: "n, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
-    params: &[],
-    needs: &[],
-    samples: &[1],
-    tessellation: true,
-    views: &[],
+    ..Info::USUAL
 };
 
 impl Technique for Tiled {

@@ -3,13 +3,16 @@
 // ORDER: 70
 
 pub mod cost;
+mod params;
+
+pub use params::VisibilityParams;
 
 use afterlight_graph::{BufferRole, Graph, ImageHandle, Load, PassRole, gpu::vk};
 
 use afterlight_cost::{Cost, Workload};
 use afterlight_frame::{
     Answers, AppendixA, Exactness, Frame, Info, OpaqueDepth, Params, Source, SourceSlots, Technique,
-    TechniqueError,
+    TechniqueError, set_constants,
 };
 use afterlight_shader::Shader;
 use afterlight_stages::{
@@ -33,7 +36,7 @@ static INFO: Info = Info {
     sources: &[Source { key: "petrescu-2016", section: "4.11" }, Source { key: "burns-2013", section: "3" }],
     answers: Answers {
         surface: "triangle IDs",
-        lights: "loop over all, tiles, clusters, or a tree",
+        lights: step::ANSWER,
         schedule: "compute, a thread a pixel",
         resolve: "one sample",
     },
@@ -47,11 +50,8 @@ static INFO: Info = Info {
         rates_decoupled: "y, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 45.0 },
-    params: &[step::LIGHTS, compute_raster::VISIBILITY, compute_raster::SMALL],
-    needs: &[],
-    samples: &[1],
     tessellation: false,
-    views: &[],
+    ..Info::USUAL
 };
 
 /// What a pixel without a surface holds: `NO_TRIANGLE` in `include/scene.glsl`.
@@ -66,13 +66,18 @@ impl Technique for Visibility {
         &crate::SHADERS
     }
 
+    fn params(&self) -> Params {
+        Params::of(VisibilityParams::default())
+    }
+
     fn predict(&self, workload: &Workload, _: &Params) -> Cost {
         cost::visibility_buffer(workload)
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
-        if compute_raster::is_chosen(frame, &INFO)? {
-            return shade_keys(graph, frame);
+        let raster = frame.params.typed::<VisibilityParams>().raster;
+        if compute_raster::is_chosen(frame, INFO.id, raster.visibility)? {
+            return shade_keys(graph, frame, raster.small_px);
         }
         let ids =
             graph.image("visibility/ids", BufferRole::Visibility, frame.image_info(vk::Format::R32_UINT));
@@ -99,8 +104,8 @@ impl Technique for Visibility {
 }
 
 /// The same from triangles that compute has found.
-fn shade_keys(graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
-    let keys = compute_raster::rasterize(graph, frame, &INFO, 1)?;
+fn shade_keys(graph: &mut Graph, frame: &Frame<'_>, small_px: u32) -> Result<ImageHandle, TechniqueError> {
+    let keys = compute_raster::rasterize(graph, frame, INFO.id, small_px, 1)?;
     shade(graph, frame, "#keys", &VisibleDepths::of_keys(&keys, 1), &|pass| {
         pass.constant("SAMPLES", 1);
         pass.read_buffer("SampleKeys", &keys);
@@ -116,7 +121,8 @@ fn shade(
     surfaces: &VisibleDepths<'_>,
     bind: &dyn Fn(&mut dyn SourceSlots),
 ) -> Result<ImageHandle, TechniqueError> {
-    let step = LightStep::build(graph, frame, &INFO, surfaces)?;
+    let lights = frame.params.typed::<VisibilityParams>().light_step().method(frame);
+    let step = LightStep::build(graph, frame, INFO.id, lights, surfaces)?;
     let radiance = graph.image(
         "visibility/radiance",
         BufferRole::Targets,
@@ -130,9 +136,7 @@ fn shade(
     );
     bind(&mut pass);
     step.bind(frame, &mut pass);
-    for (constant, value) in step.constants() {
-        pass.constant(&constant, value);
-    }
+    set_constants(&mut pass, step.constants());
     let radiance = pass.write("hdr", radiance);
     pass.dispatch(frame.groups(8));
     pass.finish();

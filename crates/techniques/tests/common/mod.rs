@@ -10,7 +10,9 @@ use afterlight_image::{Rgba8Image, psnr_db};
 use afterlight_techniques::{
     Params, Prepared, Renderer, SceneGpu, Settings, Technique, TechniqueError,
     graph::gpu,
+    params_of,
     scene::{self, Camera, Light, LightKind, Scene, lights::seeded_lights},
+    set_param,
     shader::{Shader, compile::Compiler, manifest},
 };
 use glam::Vec3;
@@ -100,9 +102,9 @@ impl Stage {
 
 /// A technique's parameters from `key=value` words.
 pub fn params(technique: &dyn Technique, sets: &[(&str, &str)]) -> Params {
-    let mut params = Params::default();
+    let mut params = params_of(technique);
     for (key, value) in sets {
-        params.set(technique.info(), key, value).unwrap_or_else(|e| panic!("{e}"));
+        set_param(technique, &mut params, key, value).unwrap_or_else(|e| panic!("{e}"));
     }
     params
 }

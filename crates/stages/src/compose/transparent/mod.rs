@@ -23,7 +23,7 @@ pub const SORTED_TRIANGLES_MAX: usize = 100_000;
 
 /// Whether a frame of those settings shows surfaces with alpha blending: debug views are of what the technique did.
 fn is_drawn(settings: &Settings, scene: &SceneGpu) -> bool {
-    settings.transparency == Transparency::Sorted
+    settings.effects.transparency.order == Transparency::Sorted
         && settings.view == views::FINAL
         && scene.blended.triangle_count() > 0
 }
@@ -68,7 +68,7 @@ impl BlendedList {
         let ordered = scene.blended.order(&ViewOrder {
             cull: cull.then_some(view.clip_from_world),
             distance_from_world: view.distance_from_world(),
-            displacement_m: settings.displacement_m,
+            displacement_m: settings.effects.tessellation.displacement_m(),
             triangles_max: SORTED_TRIANGLES_MAX,
         });
         if ordered.commands.is_empty() {

@@ -9,49 +9,21 @@ use afterlight_graph::{BufferHandle, BufferRole, ComputePass, Graph, ImageHandle
 use afterlight_shader::Shader;
 
 use crate::lights::bvh::{self, LightBvh};
-use afterlight_frame::{
-    Frame, Params, Slots, TechniqueError,
-    capacity::FIRST_GUESS,
-    params::{CLUSTER_PX, SLICES, SLICING},
-};
+use afterlight_frame::{Frame, Slots, TechniqueError, capacity::FIRST_GUESS};
+
+mod params;
+
+pub use params::{CellParams, ClusterParams, Slicing, TileParams};
 
 /// How the view is divided.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Division {
     /// Tiles, each from the nearest to the farthest of its surfaces.
-    Tiles {
-        /// Width and height of a tile, pixels.
-        tile_px: u32,
-    },
+    Tiles(TileParams),
     /// The same, and which of 32 equal steps between the two hold a surface (Harada 2012).
-    Tiles25d {
-        /// Width and height of a tile, pixels.
-        tile_px: u32,
-    },
+    Tiles25d(TileParams),
     /// Tiles cut into slices of view distance.
-    Clusters(Grid),
-}
-
-/// A grid of clusters.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Grid {
-    /// Width and height of a tile, pixels, at least 1.
-    pub cluster_px: u32,
-    /// Slices of view distance, from 1 to 256.
-    pub slices: u32,
-    /// Whether slices end at equal ratios of view distance; else in equal steps.
-    pub logarithmic: bool,
-}
-
-impl Grid {
-    /// The grid that [`PARAMS`] ask for.
-    pub fn of_params(params: &Params) -> Self {
-        Self {
-            cluster_px: params.count(&CLUSTER_PX),
-            slices: params.count(&SLICES),
-            logarithmic: params.get(&SLICING) == "logarithmic",
-        }
-    }
+    Clusters(ClusterParams),
 }
 
 impl Division {
@@ -62,16 +34,16 @@ impl Division {
 
     fn tile_px(self) -> u32 {
         match self {
-            Self::Tiles { tile_px } | Self::Tiles25d { tile_px } => tile_px,
-            Self::Clusters(grid) => grid.cluster_px,
+            Self::Tiles(tiles) | Self::Tiles25d(tiles) => tiles.tile_px,
+            Self::Clusters(clusters) => clusters.cluster_px,
         }
     }
 
     /// Cells of a tile.
     fn slices(self) -> u32 {
         match self {
-            Self::Clusters(grid) => grid.slices,
-            _ => 1,
+            Self::Clusters(clusters) => clusters.slices,
+            Self::Tiles(_) | Self::Tiles25d(_) => 1,
         }
     }
 
@@ -83,9 +55,9 @@ impl Division {
     /// Specialization constants of `grid.glsl`.
     fn constants(self) -> [(&'static str, u32); 4] {
         let (number, logarithmic) = match self {
-            Self::Clusters(grid) => (0, grid.logarithmic),
-            Self::Tiles { .. } => (1, false),
-            Self::Tiles25d { .. } => (2, false),
+            Self::Clusters(clusters) => (0, clusters.slicing == Slicing::Logarithmic),
+            Self::Tiles(_) => (1, false),
+            Self::Tiles25d(_) => (2, false),
         };
         [
             ("DIVISION", number),

@@ -6,18 +6,12 @@ use glam::Mat4;
 
 use crate::lights::volumes;
 use afterlight_cost::Workload;
-use afterlight_frame::{
-    Exactness, Frame, Info, ParamInfo, ParamKind, Params, SceneLights, Slots, TechniqueError,
-};
+use afterlight_frame::{Exactness, Frame, SceneLights, Slots, TechniqueError};
 use afterlight_scene::Light;
 
-/// Parts of a light's index.
-pub const INDEX_PARTS: ParamInfo = ParamInfo {
-    key: "index-parts",
-    summary: "parts of 2 bits, three values, that a light's index has: room for 80, 6,560 or 531,440 lights with an end; auto: as many as needed",
-    kind: ParamKind::Choice { values: &["auto", "4", "8", "12"] },
-    default: "auto",
-};
+mod params;
+
+pub use params::{IndexParts, LightIndexParams};
 
 /// What both techniques keep of the lights.
 pub const EXACTNESS: Exactness = Exactness::Approximate {
@@ -54,21 +48,16 @@ fn room(images: u32) -> u32 {
     PART_VALUES.pow(IMAGE_PARTS * images) - 1
 }
 
-/// How many parts an index has where the technique's parameter says so.
-fn fixed_parts(params: &Params, info: &Info) -> Option<u32> {
-    params.text(info, INDEX_PARTS.key).parse().ok()
-}
-
 /// Images of four parts for `lights` lights with an end, or for how many there is room at most.
-fn images(fixed_parts: Option<u32>, lights: u32) -> Result<u32, u32> {
-    let fixed = fixed_parts.map(|parts| parts / IMAGE_PARTS);
+fn images(parts: IndexParts, lights: u32) -> Result<u32, u32> {
+    let fixed = parts.count().map(|parts| parts / IMAGE_PARTS);
     let most = fixed.unwrap_or(MOST_IMAGES);
     (fixed.unwrap_or(1)..=most).find(|images| lights <= room(*images)).ok_or(room(most))
 }
 
 /// Floats a pixel of the packed indices, for predictions.
-pub fn floats(workload: &Workload, params: &Params, info: &Info) -> f64 {
-    let images = images(fixed_parts(params, info), workload.lights as u32).unwrap_or(MOST_IMAGES);
+pub fn floats(workload: &Workload, params: LightIndexParams) -> f64 {
+    let images = images(params.index_parts, workload.lights as u32).unwrap_or(MOST_IMAGES);
     f64::from(2 * images)
 }
 
@@ -85,23 +74,19 @@ pub struct LightIndices {
 pub fn build(
     graph: &mut Graph,
     frame: &Frame<'_>,
-    info: &Info,
+    technique: &str,
+    params: LightIndexParams,
     depth: &ImageHandle,
 ) -> Result<LightIndices, TechniqueError> {
     let bounded = frame.lights.count - frame.lights.unbounded_count;
-    let count =
-        images(fixed_parts(frame.params, info), bounded).map_err(|limit| TechniqueError::TooLarge {
-            what: format!(
-                "{}: lights with an end for {}={}",
-                info.id,
-                INDEX_PARTS.key,
-                frame.params.get(&INDEX_PARTS)
-            ),
-            found: bounded.into(),
-            limit: limit.into(),
-        })?;
+    let parts = params.index_parts;
+    let count = images(parts, bounded).map_err(|limit| TechniqueError::TooLarge {
+        what: format!("{technique}: lights with an end for index-parts={parts}"),
+        found: bounded.into(),
+        limit: limit.into(),
+    })?;
     let image = |i| {
-        let name = format!("{}/light indices {i}", info.id);
+        let name = format!("{}/light indices {i}", technique);
         graph.image(&name, BufferRole::Lights, frame.image_info(vk::Format::R16G16B16A16_SFLOAT))
     };
     let cleared: Vec<ImageHandle> = (0..count).map(image).collect();
@@ -112,7 +97,7 @@ pub fn build(
         &far_to_near(frame.lights, frame.clip_from_world),
     )?;
 
-    let mut pass = graph.raster(&format!("{}/indices", info.id), PassRole::LightAssignment);
+    let mut pass = graph.raster(&format!("{}/indices", technique), PassRole::LightAssignment);
     frame.bind_scene(&mut pass);
     pass.read("surface_depth", depth).read("LightOrder", &order);
     let images = cleared.into_iter().map(|image| pass.color(image, Load::Clear([0.0; 4]))).collect();
@@ -215,10 +200,10 @@ mod tests {
     #[test]
     fn images_have_room() {
         assert_eq!([1, 2, 3].map(room), [80, 6560, 531_440]);
-        let auto = [0, 80, 81, 6560, 6561, 531_440, 531_441].map(|lights| images(None, lights));
+        let auto = [0, 80, 81, 6560, 6561, 531_440, 531_441].map(|lights| images(IndexParts::Auto, lights));
         assert_eq!(auto, [Ok(1), Ok(1), Ok(2), Ok(2), Ok(3), Ok(3), Err(531_440)]);
-        let fixed = |parts, lights| images(Some(parts), lights);
-        assert_eq!((fixed(8, 3), fixed(8, 6560), fixed(4, 81)), (Ok(2), Ok(2), Err(80)));
+        let (four, eight) = (IndexParts::Four, IndexParts::Eight);
+        assert_eq!((images(eight, 3), images(eight, 6560), images(four, 81)), (Ok(2), Ok(2), Err(80)));
     }
 
     #[test]

@@ -8,21 +8,14 @@ use crate::lights::{
     volumes,
 };
 use afterlight_cost::Workload;
-use afterlight_frame::{Frame, ParamInfo, ParamKind, Slots, TechniqueError, capacity::FIRST_GUESS};
+use afterlight_frame::{Frame, Slots, TechniqueError, capacity::FIRST_GUESS, params::AutoOr};
 
-/// Nodes of the lists.
-pub const NODES: ParamInfo = ParamInfo {
-    key: "light-nodes",
-    summary: "nodes of the light lists; auto: as many as the view needs, counted; fixed: what finds none is dropped and told",
-    kind: ParamKind::AutoOrInteger { min: 0, max: MOST_NODES },
-    default: "auto",
-};
+mod params;
+
+pub use params::LightListParams;
 
 /// Name of the counter of nodes.
 const COUNTER: &str = "light nodes";
-
-/// Most nodes, below where the count on the device ends.
-const MOST_NODES: u32 = 1 << 30;
 
 /// The lists of a frame: a head of 12 bytes a pixel, nodes of 8 bytes.
 pub struct LightLists {
@@ -41,24 +34,28 @@ pub struct LightLists {
 pub fn build(
     graph: &mut Graph,
     frame: &Frame<'_>,
-    info: &afterlight_frame::Info,
+    technique: &str,
+    nodes: AutoOr<u32>,
     surfaces: &VisibleDepths<'_>,
     depth: Option<&ImageHandle>,
 ) -> Result<LightLists, TechniqueError> {
-    let fixed: Option<u32> = frame.params.text(info, NODES.key).parse().ok();
+    let fixed = nodes.fixed();
     let capacity = fixed.unwrap_or_else(|| frame.capacity(COUNTER, FIRST_GUESS));
-    frame.check_binding(info.id, "light nodes", 8 * u64::from(capacity))?;
-    let tree = bvh::build(graph, frame, info.id)?;
-    let mut heads = empty_heads(graph, frame, info.id, surfaces)?;
-    let count = graph.buffer(&format!("{}/light node count", info.id), BufferRole::Lights, 8);
+    frame.check_binding(technique, "light nodes", 8 * u64::from(capacity))?;
+    let tree = bvh::build(graph, frame, technique)?;
+    let mut heads = empty_heads(graph, frame, technique, surfaces)?;
+    let count = graph.buffer(&format!("{}/light node count", technique), BufferRole::Lights, 8);
     let mut count = graph.clear_buffer(
-        &format!("{}/clear light node count", info.id),
+        &format!("{}/clear light node count", technique),
         PassRole::LightAssignment,
         count,
         0,
     );
-    let mut nodes =
-        graph.buffer(&format!("{}/light nodes", info.id), BufferRole::Lights, 8 * u64::from(capacity.max(1)));
+    let mut nodes = graph.buffer(
+        &format!("{}/light nodes", technique),
+        BufferRole::Lights,
+        8 * u64::from(capacity.max(1)),
+    );
 
     let bounded = frame.lights.bounded_count();
     if bounded > 0 {
@@ -70,7 +67,7 @@ pub fn build(
             .depth(test)
             .constant("NODE_CAPACITY", capacity)
             .constant("SAMPLED", u32::from(surfaces.samples() > 1));
-        let mut pass = graph.raster(&format!("{}/lists", info.id), PassRole::LightAssignment);
+        let mut pass = graph.raster(&format!("{}/lists", technique), PassRole::LightAssignment);
         frame.bind_scene(&mut pass);
         heads = pass.write("LightHeads", heads);
         nodes = pass.write("LightNodes", nodes);
@@ -86,7 +83,7 @@ pub fn build(
         pass.finish();
     } else {
         nodes = graph.clear_buffer(
-            &format!("{}/clear light nodes", info.id),
+            &format!("{}/clear light nodes", technique),
             PassRole::LightAssignment,
             nodes,
             0,

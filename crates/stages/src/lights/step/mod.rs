@@ -1,38 +1,64 @@
-//! The stage by which surfaces find their lights, for every technique that shades a surface at once: the parameter `lights`, what it
+//! The stage by which surfaces find their lights, for every technique that shades a surface at once: by what method, what it
 //! builds, and what `radiance.glsl` reads of it.
 
 use afterlight_graph::{BufferRole, Graph, ImageHandle, PassRole};
 
 use crate::lights::{
     bvh::{self, LightBvh},
-    cells::{self, CellLists, Division, Grid, VisibleDepths},
+    cells::{self, CellLists, CellParams, Division, VisibleDepths},
     pixel_lists::{self, LightLists},
 };
-use afterlight_frame::{Frame, Info, ParamInfo, ParamKind, Params, Slots, TechniqueError, views};
+use afterlight_frame::{Frame, Slots, TechniqueError, params::AutoOr, views};
+
+mod params;
+
+pub use params::{
+    GbufferLightParams, GbufferLights, LightParams, LightStepParams, Lights, StepParams, asked,
+};
 
 /// Lights up to which a loop over all of them costs less than any structure, by `auto`.
 const FEW_LIGHTS: u32 = 16;
 
-/// Name of the parameter.
-pub const KEY: &str = "lights";
+/// What a technique with these parameters answers to how lights and surfaces find each other.
+pub const ANSWER: &str = "loop over all, light volumes, lists, tiles, clusters, or a tree";
 
-/// Which lights a surface visits, for sources of several surfaces a pixel.
-pub const LIGHTS: ParamInfo = ParamInfo {
-    key: KEY,
-    summary: "lights that a surface visits: all, those on the list of its pixel (lists), its tile (tiles; tiles25 with 32 bits of depth) or its cluster, or those that a tree over the lights leads to; volumes: each light's volume adds it; auto: all where they are few, else clusters",
-    kind: ParamKind::Choice {
-        values: &["auto", "all", "volumes", "lists", "tiles", "tiles25", "clusters", "tree"],
-    },
-    default: "auto",
-};
+/// How surfaces find their lights, where nothing is left open.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LightMethod {
+    /// Every surface visits all.
+    All,
+    /// Each light's volume adds it.
+    Volumes,
+    /// By the list of its pixel.
+    Lists,
+    /// By the list of its tile or cluster.
+    Cells(Division),
+    /// By a tree over the lights.
+    Tree,
+}
 
-/// The same for a G-buffer of one sample, where passes may also add lights one by one, or list them for every pixel.
-pub const GBUFFER_LIGHTS: ParamInfo = ParamInfo {
-    key: KEY,
-    summary: "how surfaces find lights: each light's volume adds it (volumes), a loop over all, the list of the pixel, tile (tiles; tiles25 with 32 bits of depth) or cluster, or a tree over the lights",
-    kind: ParamKind::Choice { values: &["volumes", "all", "lists", "tiles", "tiles25", "clusters", "tree"] },
-    default: "volumes",
-};
+impl LightStepParams {
+    /// What they mean for a frame: few lights need no structure. The view of cells shows clusters where there would be none.
+    pub fn method(self, frame: &Frame<'_>) -> LightMethod {
+        let CellParams { tiles, clusters } = self.cells;
+        let clusters = LightMethod::Cells(Division::Clusters(clusters));
+        let method = match self.lights {
+            Lights::Auto if frame.lights.count <= FEW_LIGHTS => LightMethod::All,
+            Lights::Auto | Lights::Clusters => clusters,
+            Lights::All => LightMethod::All,
+            Lights::Volumes => LightMethod::Volumes,
+            Lights::Lists => LightMethod::Lists,
+            Lights::Tiles => LightMethod::Cells(Division::Tiles(tiles)),
+            Lights::Tiles25d => LightMethod::Cells(Division::Tiles25d(tiles)),
+            Lights::Tree => LightMethod::Tree,
+        };
+        match method {
+            LightMethod::Cells(_) => method,
+            _ if frame.shows(views::CLUSTERS) => clusters,
+            _ => method,
+        }
+    }
+}
 
 /// How surfaces find their lights.
 pub enum LightStep {
@@ -48,49 +74,28 @@ pub enum LightStep {
     None,
 }
 
-/// How cells divide the view for a value of `lights`, by the technique's parameters of them or their defaults.
-fn division(value: &str, params: &Params) -> Option<Division> {
-    let tile_px = params.count(&afterlight_frame::params::TILE_PX);
-    Some(match value {
-        "tiles" => Division::Tiles { tile_px },
-        "tiles25" => Division::Tiles25d { tile_px },
-        "clusters" => Division::Clusters(Grid::of_params(params)),
-        _ => return None,
-    })
-}
-
-/// The value of `lights` of a frame's technique, `auto` resolved.
-///
-/// The view of cells shows clusters where the technique would have none.
-pub fn chosen<'a>(frame: &'a Frame<'_>, info: &'a Info) -> &'a str {
-    match frame.params.text(info, KEY) {
-        value if frame.shows(views::CLUSTERS) && !value.starts_with("tiles") => "clusters",
-        "auto" if frame.lights.count <= FEW_LIGHTS => "all",
-        "auto" => "clusters",
-        value => value,
-    }
-}
-
 impl LightStep {
-    /// Builds what the technique's `lights` asks for, from where the surfaces of the image stand.
+    /// Builds what a method takes, from where the surfaces of the image stand.
     ///
     /// # Errors
     /// As [`cells::build`].
     pub fn build(
         graph: &mut Graph,
         frame: &Frame<'_>,
-        info: &Info,
+        technique: &str,
+        method: LightMethod,
         surfaces: &VisibleDepths<'_>,
     ) -> Result<Self, TechniqueError> {
-        let value = chosen(frame, info);
-        if let Some(division) = division(value, frame.params) {
-            return Ok(Self::Cells(cells::build(graph, frame, info.id, division, surfaces)?));
-        }
-        Ok(match value {
-            "lists" => Self::Lists(pixel_lists::build(graph, frame, info, surfaces, None)?),
-            "tree" => Self::Tree(bvh::build(graph, frame, info.id)?),
-            "volumes" => Self::None,
-            _ => Self::All,
+        Ok(match method {
+            LightMethod::All => Self::All,
+            LightMethod::Volumes => Self::None,
+            LightMethod::Lists => {
+                Self::Lists(pixel_lists::build(graph, frame, technique, AutoOr::Auto, surfaces, None)?)
+            }
+            LightMethod::Cells(division) => {
+                Self::Cells(cells::build(graph, frame, technique, division, surfaces)?)
+            }
+            LightMethod::Tree => Self::Tree(bvh::build(graph, frame, technique)?),
         })
     }
 
@@ -118,12 +123,13 @@ impl LightStep {
     pub fn lists(
         graph: &mut Graph,
         frame: &Frame<'_>,
-        info: &Info,
+        technique: &str,
+        nodes: AutoOr<u32>,
         depth: &ImageHandle,
     ) -> Result<Self, TechniqueError> {
         let surfaces = VisibleDepths::of_depth(depth, frame.samples);
         let tested = (frame.samples == 1).then_some(depth);
-        Ok(Self::Lists(pixel_lists::build(graph, frame, info, &surfaces, tested)?))
+        Ok(Self::Lists(pixel_lists::build(graph, frame, technique, nodes, &surfaces, tested)?))
     }
 
     /// Binds what `radiance.glsl` reads. What the step does not have is read by no one, yet its slots are there: resources of the same

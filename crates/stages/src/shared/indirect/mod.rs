@@ -53,7 +53,7 @@ impl SceneInput for Rsm {
 
 /// Why there is no indirect light though it was asked for.
 pub fn warning(settings: &Settings, scene: &SceneGpu) -> Option<String> {
-    (settings.indirect == Indirect::Rsm && light_view::source(scene, settings).is_none())
+    (settings.effects.indirect.method == Indirect::Rsm && light_view::source(scene, settings).is_none())
         .then(|| "no indirect light: the scene has no light, or no surface, to take it from".to_owned())
 }
 
@@ -77,7 +77,7 @@ pub fn pattern() -> [[f32; 3]; SAMPLES] {
 /// # Errors
 /// A shader that is not compiled in, the device.
 pub fn record(graph: &mut Graph, frame: &mut Frame<'_>, settings: &Settings) -> Result<(), TechniqueError> {
-    let source = match settings.indirect {
+    let source = match settings.effects.indirect.method {
         Indirect::None => None,
         Indirect::Rsm => light_view::source(frame.scene, settings),
     };
@@ -88,7 +88,7 @@ pub fn record(graph: &mut Graph, frame: &mut Frame<'_>, settings: &Settings) -> 
             constants.clip_from_world = source.clip_from_world().to_cols_array_2d();
             let area_m2 = (2.0 * source.half_height()).powi(2);
             constants.samples = pattern().map(|[x, y, share]| [x, y, share * area_m2, 0.0]);
-            let size_px = settings.rsm_size_px;
+            let size_px = settings.effects.indirect.map_size_px;
             let pass = ("shared/rsm", size_px);
             Some(light_view::look_through(graph, frame, settings, source, pass, |graph, frame| {
                 raster(graph, frame, size_px, frame.lights.index_of(&source.light))

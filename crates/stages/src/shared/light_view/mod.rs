@@ -11,8 +11,7 @@ use afterlight_scene::{Aabb, Camera, Light, LightKind, Projection};
 use glam::{Mat4, Vec3};
 
 use afterlight_frame::{
-    CameraView, Frame, SceneGpu, Settings, TechniqueError,
-    scene::draw_list::{DrawList, DrawOptions},
+    CameraView, DrawParams, Frame, SceneGpu, Settings, TechniqueError, scene::draw_list::DrawList,
 };
 
 /// Widest angle of a light's perspective view, radians: further out a texel has hardly any solid angle.
@@ -100,7 +99,7 @@ fn perspective_view(light: &Light, target_ws: Vec3, angle_rad: f32, bounds_ws: &
 
 /// The light of a scene's settings, and its view; `None` without a light or a surface. Displaced surfaces are in view too.
 pub fn source(scene: &SceneGpu, settings: &Settings) -> Option<SourceView> {
-    SourceView::choose(&settings.lights, &scene.bounds_ws(settings.displacement_m))
+    SourceView::choose(&settings.lights, &scene.bounds_ws(settings.effects.tessellation.displacement_m()))
 }
 
 /// Uploads constants of a shader.
@@ -138,8 +137,13 @@ pub fn look_through<T>(
     let settings =
         Settings { camera: source.camera.clone(), width_px: size_px, height_px: size_px, ..settings.clone() };
     let view = CameraView::new(&settings);
-    let mut draws = DrawList::new(frame.device, frame.scene, DrawOptions::default())?;
-    draws.update(frame.scene, view.clip_from_world, view.eye_ws, settings.displacement_m)?;
+    let mut draws = DrawList::new(frame.device, frame.scene, DrawParams::default())?;
+    draws.update(
+        frame.scene,
+        view.clip_from_world,
+        view.eye_ws,
+        settings.effects.tessellation.displacement_m(),
+    )?;
     let name = format!("{pass} view");
     let constants = upload(frame.device, &name, &view.constants(&settings, frame.lights, frame.scene))?;
     let imported = [

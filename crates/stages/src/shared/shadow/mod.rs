@@ -43,7 +43,7 @@ impl SceneInput for Shadow {
 
 /// Why there are no shadows though they were asked for.
 pub fn warning(settings: &Settings, scene: &SceneGpu) -> Option<String> {
-    (settings.shadows == Shadows::Map && light_view::source(scene, settings).is_none())
+    (settings.effects.shadows.method == Shadows::Map && light_view::source(scene, settings).is_none())
         .then(|| "no shadows: the scene has no light, or no surface, to cast them".to_owned())
 }
 
@@ -52,7 +52,7 @@ pub fn warning(settings: &Settings, scene: &SceneGpu) -> Option<String> {
 /// # Errors
 /// A shader that is not compiled in, the device.
 pub fn record(graph: &mut Graph, frame: &mut Frame<'_>, settings: &Settings) -> Result<(), TechniqueError> {
-    let source = match settings.shadows {
+    let source = match settings.effects.shadows.method {
         Shadows::None => None,
         Shadows::Map => light_view::source(frame.scene, settings),
     };
@@ -60,8 +60,8 @@ pub fn record(graph: &mut Graph, frame: &mut Frame<'_>, settings: &Settings) -> 
     let map = match &source {
         None => None,
         Some(source) => {
-            let size_px = settings.shadow_map_size_px;
-            let nearer_texels = NEARER_TEXELS * settings.shadow_bias;
+            let size_px = settings.effects.shadows.map_size_px;
+            let nearer_texels = NEARER_TEXELS * settings.effects.shadows.bias;
             constants = ShadowConstants {
                 texel_from_world: texel_from_world(source, size_px, nearer_texels).to_cols_array_2d(),
                 light_index: frame.lights.index_of(&source.light),
@@ -69,7 +69,7 @@ pub fn record(graph: &mut Graph, frame: &mut Frame<'_>, settings: &Settings) -> 
             };
             let pass = ("shared/shadow", size_px);
             Some(light_view::look_through(graph, frame, settings, source, pass, |graph, frame| {
-                raster(graph, frame, size_px, settings.shadow_bias)
+                raster(graph, frame, size_px, settings.effects.shadows.bias)
             })?)
         }
     };

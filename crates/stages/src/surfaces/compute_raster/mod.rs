@@ -7,10 +7,13 @@
 use afterlight_graph::{BufferHandle, BufferRole, Graph, PassRole};
 
 use afterlight_frame::{
-    Frame, Info, TechniqueError,
-    params::{ParamInfo, ParamKind},
+    Frame, TechniqueError,
     scene::{BUCKETS, DRAW_TRIANGLES},
 };
+
+mod params;
+
+pub use params::{ComputeRasterParams, Visibility};
 
 /// Large triangles that the first frame has room for.
 const FIRST_LARGE: u32 = 1 << 16;
@@ -22,23 +25,7 @@ const LIST_GROUPS: u32 = 4096;
 /// Triangles, and threads, of a group: `local_size_x` in `triangles.comp.glsl`.
 const GROUP_TRIANGLES: u32 = 128;
 
-/// Who finds the triangles of a technique that reads triangle IDs.
-pub const VISIBILITY: ParamInfo = ParamInfo {
-    key: "visibility",
-    summary: "who finds the triangles that show: a raster pass, or rasterisation in compute; auto: compute on a GPU that has 64-bit buffer atomics",
-    kind: ParamKind::Choice { values: &["auto", "raster", "compute"] },
-    default: "auto",
-};
-
-/// Which triangles one thread rasterises.
-pub const SMALL: ParamInfo = ParamInfo {
-    key: "small-px",
-    summary: "visibility=compute: side in pixels below which one thread rasterises a triangle; larger ones are cut into tiles",
-    kind: ParamKind::Integer { min: 1, max: 64 },
-    default: "16",
-};
-
-/// Whether a frame of the technique is rasterised in compute, by its parameter [`VISIBILITY`].
+/// Whether a frame of the technique is rasterised in compute.
 ///
 /// `auto` expects that to be faster on everything but a CPU: measured on an NVIDIA H200, where 8 samples of Sponza at
 /// 1920×1080 take 2.2 ms instead of 8.6, and on lavapipe, whose raster pass is its own vectorised code, 1,860 ms instead of
@@ -46,23 +33,27 @@ pub const SMALL: ParamInfo = ParamInfo {
 ///
 /// # Errors
 /// `compute` on a device that lacks what it takes.
-pub fn is_chosen(frame: &Frame<'_>, info: &Info) -> Result<bool, TechniqueError> {
+pub fn is_chosen(
+    frame: &Frame<'_>,
+    technique: &'static str,
+    visibility: Visibility,
+) -> Result<bool, TechniqueError> {
     let is_supported = frame.features().buffer_int64_atomics && frame.features().shader_int64;
-    match frame.params.text(info, VISIBILITY.key) {
-        "compute" if !is_supported => Err(TechniqueError::Unavailable {
-            technique: info.id,
+    match visibility {
+        Visibility::Compute if !is_supported => Err(TechniqueError::Unavailable {
+            technique,
             missing:
                 "64-bit integers and buffer atomics for visibility=compute (visibility=raster does without)"
                     .to_owned(),
         }),
-        "compute" => Ok(true),
-        "auto" => Ok(is_supported && !frame.is_cpu()),
-        _ => Ok(false),
+        Visibility::Compute => Ok(true),
+        Visibility::Auto => Ok(is_supported && !frame.is_cpu()),
+        Visibility::Raster => Ok(false),
     }
 }
 
 /// Declares the passes that rasterise the draws in view at `samples` samples a pixel. Returns a key a sample, those of a pixel
-/// side by side; triangles below [`SMALL`] pixels take a thread each. Rows from the top: bits 63 to 32 depth (reversed, 0: no surface), bits 31 to 0 the complement of command
+/// side by side; triangles below `small_px` pixels take a thread each. Rows from the top: bits 63 to 32 depth (reversed, 0: no surface), bits 31 to 0 the complement of command
 /// `<< 10 |` triangle, where the command is the draw's place in the buffer of draw commands.
 ///
 /// # Errors
@@ -70,11 +61,10 @@ pub fn is_chosen(frame: &Frame<'_>, info: &Info) -> Result<bool, TechniqueError>
 pub fn rasterize(
     graph: &mut Graph,
     frame: &Frame<'_>,
-    info: &Info,
+    technique: &str,
+    small_px: u32,
     samples: u32,
 ) -> Result<BufferHandle, TechniqueError> {
-    let technique = info.id;
-    let small_px = frame.params.number(info, SMALL.key) as u32;
     let bytes = 8 * u64::from(frame.width_px) * u64::from(frame.height_px) * u64::from(samples);
     frame.check_binding(technique, &format!("a key for each of {samples} samples of every pixel"), bytes)?;
     let large_capacity = frame.capacity("large_triangles", FIRST_LARGE);

@@ -1,15 +1,16 @@
 //! Depth alone first, then forward shading of what is visible: by a loop over all lights, or by the lists of lights of a light step.
 
-use afterlight_frame::{Frame, Info, OpaqueDepth, TechniqueError, views::INVOCATIONS};
+mod by_cells;
+
+pub use by_cells::ForwardByCells;
+
+use afterlight_frame::{Frame, OpaqueDepth, TechniqueError, views::INVOCATIONS};
 use afterlight_graph::{
     BufferRole, DepthTest, Graph, ImageHandle, Load, PassRole, RasterPass, StencilFace, StencilTest, gpu::vk,
 };
 
 use crate::{
-    lights::{
-        cells::{self, Division, VisibleDepths},
-        step::LightStep,
-    },
+    lights::step::LightStep,
     surfaces::{RadianceTarget, geometry::SceneDraws},
 };
 
@@ -100,21 +101,4 @@ pub fn shade_forward(
 ) -> Result<ImageHandle, TechniqueError> {
     let shader = (technique, "surfaces/depth_first/by_lights.frag");
     shade_visible(graph, frame, shader, depth, step.constants(), |pass| step.bind(frame, pass))
-}
-
-/// A depth pre-pass, lists of lights of the cells that it shows, and forward shading by them.
-///
-/// # Errors
-/// As [`cells::build`].
-pub fn record_forward(
-    graph: &mut Graph,
-    frame: &Frame<'_>,
-    info: &Info,
-    division: Division,
-) -> Result<ImageHandle, TechniqueError> {
-    let depth = draw_depth(graph, frame, info.id)?;
-    let surfaces = VisibleDepths::of_depth(&depth, frame.samples);
-    let lists = cells::build(graph, frame, info.id, division, &surfaces)?;
-    drop(surfaces);
-    shade_forward(graph, frame, info.id, depth, &LightStep::Cells(lists))
 }

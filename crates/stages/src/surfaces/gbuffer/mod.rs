@@ -13,7 +13,7 @@
 use afterlight_graph::{BufferRole, ComputePass, Graph, ImageHandle, Load, PassRole, RasterPass, gpu::vk};
 
 use crate::{lights::step::LightStep, surfaces::geometry::SceneDraws};
-use afterlight_frame::{Frame, OpaqueDepth, Slots, TechniqueError};
+use afterlight_frame::{Frame, OpaqueDepth, Slots, TechniqueError, set_constants};
 
 /// Handles of a filled G-buffer.
 pub struct GBuffer {
@@ -97,9 +97,7 @@ pub fn shade(
 ) -> Result<ImageHandle, TechniqueError> {
     shade_by(graph, frame, (technique, "surfaces/gbuffer/shade.comp"), filled, |pass| {
         step.bind(frame, pass);
-        for (constant, value) in step.constants() {
-            pass.constant(&constant, value);
-        }
+        set_constants(pass, step.constants());
     })
 }
 

@@ -5,11 +5,12 @@
 
 use afterlight_graph::{BufferHandle, BufferRole, Graph, ImageHandle, Load, PassRole, RasterPass, gpu::vk};
 
-use crate::{
-    lights::{cells, step::LightStep, volumes},
-    surfaces::{geometry::SceneDraws, visible::NO_TRIANGLE_RGBA8},
+use crate::lights::{
+    cells,
+    step::{LightMethod, LightStep},
+    volumes,
 };
-use afterlight_frame::{Frame, Info, Need, Slots, SourceSlots, TechniqueError, views};
+use afterlight_frame::{Frame, Slots, SourceSlots, TechniqueError, set_constants, views};
 
 /// Views of techniques that end in [`shade`].
 pub const VIEWS: &[&str] = &[views::SAMPLE_USAGE, views::INVOCATIONS, views::EDGES, views::WEIGHTS];
@@ -51,8 +52,8 @@ fn named(folder: &str, template: &str, tags: &[&str]) -> String {
     format!("{folder}/{template}{separator}{}", tags.join("-"))
 }
 
-/// Declares the pass `technique/shade`: shades every surface that `source` holds of a pixel by the lights that the technique's parameter
-/// `lights` lets them visit and averages them; `surfaces` are where they stand, `bind` binds what the source reads. Returns radiance,
+/// Declares the pass `technique/shade`: shades every surface that `source` holds of a pixel by the lights that it finds by `lights`
+/// and averages them; `surfaces` are where they stand, `bind` binds what the source reads. Returns radiance,
 /// RGBA16F.
 ///
 /// # Errors
@@ -60,14 +61,13 @@ fn named(folder: &str, template: &str, tags: &[&str]) -> String {
 pub fn shade(
     graph: &mut Graph,
     frame: &Frame<'_>,
-    info: &Info,
+    (technique, lights): (&str, LightMethod),
     source: SurfaceSource<'_>,
     surfaces: &cells::VisibleDepths<'_>,
     bind: &dyn Fn(&mut dyn SourceSlots),
 ) -> Result<ImageHandle, TechniqueError> {
-    let technique = info.id;
     let samples = source.samples;
-    let step = LightStep::build(graph, frame, info, surfaces)?;
+    let step = LightStep::build(graph, frame, technique, lights, surfaces)?;
     let shader = frame.shader(&source.shading_shader())?;
     let radiance = graph.image(
         &format!("{technique}/radiance"),
@@ -75,12 +75,8 @@ pub fn shade(
         frame.image_info(vk::Format::R16G16B16A16_SFLOAT),
     );
     let mut pass = frame.compute(graph, &format!("{technique}/shade"), PassRole::Shading, &shader);
-    for (name, value) in shade_constants(frame, samples) {
-        pass.constant(name, value);
-    }
-    for (name, value) in step.constants() {
-        pass.constant(&name, value);
-    }
+    set_constants(&mut pass, shade_constants(frame, samples));
+    set_constants(&mut pass, step.constants());
     bind(&mut pass);
     step.bind(frame, &mut pass);
     let radiance = pass.write("hdr", radiance);

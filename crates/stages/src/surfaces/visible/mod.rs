@@ -5,9 +5,12 @@ use afterlight_graph::{BufferHandle, BufferRole, Graph, ImageHandle, Load, PassR
 
 use crate::{
     lights::cells,
-    surfaces::{compute_raster, geometry::SceneDraws},
+    surfaces::{
+        compute_raster::{self, ComputeRasterParams},
+        geometry::SceneDraws,
+    },
 };
-use afterlight_frame::{Frame, Info, Slots, TechniqueError};
+use afterlight_frame::{Frame, Slots, TechniqueError};
 
 /// What a pixel without a surface holds in an image of triangle IDs: `NO_TRIANGLE`, all ones.
 pub const NO_TRIANGLE_RGBA8: [f32; 4] = [1.0; 4];
@@ -33,22 +36,23 @@ pub enum Visible {
 }
 
 impl Visible {
-    /// Declares what finds the triangles at `samples` samples a pixel: the passes of [`compute_raster`] where the technique's
-    /// parameter [`compute_raster::VISIBILITY`] says so, else the pass `technique/ids`.
+    /// Declares what finds the triangles at `samples` samples a pixel: the passes of [`compute_raster`] where the
+    /// parameters say so, else the pass `technique/ids`.
     ///
     /// # Errors
     /// Those of [`compute_raster::is_chosen`] and [`compute_raster::rasterize`].
     pub fn find(
         graph: &mut Graph,
         frame: &Frame<'_>,
-        info: &Info,
+        technique: &'static str,
+        raster: ComputeRasterParams,
         samples: u32,
     ) -> Result<Self, TechniqueError> {
-        if compute_raster::is_chosen(frame, info)? {
-            let keys = compute_raster::rasterize(graph, frame, info, samples)?;
+        if compute_raster::is_chosen(frame, technique, raster.visibility)? {
+            let keys = compute_raster::rasterize(graph, frame, technique, raster.small_px, samples)?;
             return Ok(Self::Keys { keys, samples });
         }
-        let name = |part: &str| format!("{}/{part}", info.id);
+        let name = |part: &str| format!("{technique}/{part}");
         let image = |format| frame.image_info(format).samples(samples);
         let ids = graph.image(&name("ids"), BufferRole::Visibility, image(vk::Format::R8G8B8A8_UNORM));
         let depth = graph.image(&name("depth"), BufferRole::Depth, image(vk::Format::D32_SFLOAT));

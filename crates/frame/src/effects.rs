@@ -1,4 +1,5 @@
-//! Effects of a frame, whatever the technique: each is declared beside its stage, and all stand in [`Effects`].
+//! Effects of a frame, whatever the technique. Adding one is declaring it here, once, with its place in [`Effects`], and a stage that reads it:
+//! command lines, specifications and records of settings go by the declaration.
 
 use afterlight_params::{choices, parameters};
 

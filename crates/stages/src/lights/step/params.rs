@@ -1,8 +1,8 @@
 //! Parameters of the stage by which surfaces find their lights.
 
-use afterlight_params::{choices, parameters};
+use afterlight_frame::params::{Params, choices, parameters};
 
-use super::clusters::CellParams;
+use crate::lights::cells::CellParams;
 
 choices! {
     /// Which lights a surface visits.
@@ -94,9 +94,33 @@ impl LightParams {
     }
 }
 
+/// The lights that a surface visits by those parameters; `None` where they leave no choice.
+pub fn asked(params: &Params) -> Option<Lights> {
+    let one_sample = || params.find::<GbufferLightParams>().map(|params| params.lights.into());
+    params.find::<LightParams>().map(|params| params.lights).or_else(one_sample)
+}
+
 impl GbufferLightParams {
     /// With how cells divide the view.
     pub fn with(self, cells: CellParams) -> LightStepParams {
         LightStepParams { lights: self.lights.into(), cells }
+    }
+}
+
+parameters! {
+    /// Parameters of a technique that asks for nothing besides how its surfaces find their lights.
+    #[derive(Copy)]
+    pub struct StepParams {
+        /// Which lights a surface visits.
+        ..lights: LightParams;
+        /// How cells divide the view.
+        ..cells: CellParams;
+    }
+}
+
+impl StepParams {
+    /// How surfaces find their lights.
+    pub fn light_step(&self) -> LightStepParams {
+        self.lights.with(self.cells)
     }
 }

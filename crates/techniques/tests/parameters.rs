@@ -1,20 +1,26 @@
 //! Parameters that moved from lists of constants into structs are told as before.
 
-#[allow(dead_code, reason = "what reads the fields is elsewhere")]
-#[path = "../drafts/mod.rs"]
-mod drafts;
-
-use afterlight_params::{AutoOr, NoParams, ParamSet as _, Words};
-use drafts::{
-    clusters::CellParams,
-    dais::{CacheParams, DaisParams, Fill},
-    dais_multirate::{Rate, RateParams},
+use afterlight_stages::lights::{
+    cells::CellParams,
+    step::{Lights, StepParams, asked},
+};
+use afterlight_techniques::{
+    DrawOrder, DrawParams, Params,
+    dais::{CacheParams, DaisParams, Fill, Rate, RateParams},
     deferred::DeferredParams,
-    draws::DrawParams,
+    find,
     gbuffer_list::{Filter, FilterParams, GbufferListParams},
-    light_step::Lights,
+    params::{AutoOr, NoParams, ParamSet as _, Words},
+    params_of, registry,
 };
 use serde_json::{Value, json};
+
+/// The id of every technique that there was when parameters were constants, with its parameters.
+fn techniques() -> Vec<(&'static str, Params)> {
+    let before = before();
+    let known = registry().iter().filter(|technique| before.contains_key(technique.info().id));
+    known.map(|technique| (technique.info().id, params_of(*technique))).collect()
+}
 
 /// What `afterlight techniques --json` told of parameters when they were constants.
 fn before() -> serde_json::Map<String, Value> {
@@ -27,7 +33,7 @@ fn before() -> serde_json::Map<String, Value> {
 #[test]
 fn lists_are_as_they_were() {
     let before = before();
-    let now = drafts::techniques();
+    let now = techniques();
     let ids: Vec<&str> = now.iter().map(|(id, _)| *id).collect();
     assert_eq!(ids, before.keys().map(String::as_str).collect::<Vec<_>>());
     for (id, params) in &now {
@@ -40,7 +46,7 @@ fn lists_are_as_they_were() {
 #[test]
 fn defaults_resolve_to_what_lists_say() {
     let before = before();
-    for (id, params) in drafts::techniques() {
+    for (id, params) in techniques() {
         let list = before[id].as_array().expect("a list");
         let expected: serde_json::Map<String, Value> = list
             .iter()
@@ -52,7 +58,7 @@ fn defaults_resolve_to_what_lists_say() {
 
 #[test]
 fn every_default_and_end_of_a_range_is_taken() {
-    for (id, mut params) in drafts::techniques() {
+    for (id, mut params) in techniques() {
         let defaults = params.clone();
         for info in params.infos() {
             params.set(info.key, &info.default).unwrap_or_else(|e| panic!("{id}: {e}"));
@@ -73,8 +79,7 @@ fn every_default_and_end_of_a_range_is_taken() {
 
 #[test]
 fn what_is_read_has_types() {
-    let all = drafts::techniques();
-    let mut dais = all.iter().find(|(id, _)| *id == "dais").expect("dais").1.clone();
+    let mut dais = params_of(find("dais").expect("dais"));
     dais.set("fill", "cache").expect("a name");
     dais.set("cache-buckets", "65536").expect("in range");
     dais.set("order", "scene").expect("a name");
@@ -84,7 +89,7 @@ fn what_is_read_has_types() {
     assert_eq!(typed.light_step().cells.tiles.tile_px, 32);
     assert_eq!(dais.typed::<CacheParams>().buckets, 65536);
     assert_eq!(dais.typed::<CellParams>().clusters.slices, 128);
-    assert_eq!(dais.typed::<DrawParams>().order, drafts::draws::DrawOrder::Scene);
+    assert_eq!(dais.typed::<DrawParams>().order, DrawOrder::Scene);
     dais.typed_mut::<DaisParams>().fill.fill = Fill::Resolve;
     assert_eq!(dais.get("fill").as_deref(), Some("resolve"));
     assert!(dais.find::<NoParams>().is_none());
@@ -92,10 +97,7 @@ fn what_is_read_has_types() {
 
 #[test]
 fn shared_sets_have_defaults_of_their_own() {
-    let all = drafts::techniques();
-    let rate = |id: &str| {
-        all.iter().find(|one| one.0 == id).expect("a technique").1.typed::<RateParams>().rate.cell_px()
-    };
+    let rate = |id: &str| params_of(find(id).expect("a technique")).typed::<RateParams>().rate.cell_px();
     assert_eq!((rate("dais-list"), rate("dais-multirate")), (1, 2));
     assert_eq!(RateParams::default().rate, Rate::Half);
     assert_eq!(DeferredParams::default().light_step().lights, Lights::Volumes);
@@ -114,4 +116,40 @@ fn filters_are_bits() {
     assert_eq!(params.filter, FilterParams { filters: Words::NONE, ..FilterParams::default() });
     assert!(params.set("filter", "none+edges").is_err());
     assert_eq!([Filter::Edges].into_iter().collect::<Words<_>>().bits(), 1 << 5);
+}
+
+#[test]
+fn what_is_left_open_has_its_default() {
+    let dais = find("dais").expect("dais");
+    let mut own = DaisParams::default();
+    own.fill.fill = Fill::Cache;
+    let params =
+        afterlight_techniques::completed(dais, &Params::of(own).and(Params::of(NoParams::default())));
+    assert_eq!(params.typed::<DaisParams>().fill.fill, Fill::Cache);
+    assert_eq!(params.typed::<DrawParams>(), &DrawParams::default());
+    assert!(!params.holds::<NoParams>(), "what the technique does not have is left out");
+    assert_eq!(afterlight_techniques::completed(dais, &Params::default()), params_of(dais));
+}
+
+#[test]
+fn errors_name_the_technique_and_what_it_has() {
+    let tiled = find("tiled-forward").expect("tiled-forward");
+    let mut params = params_of(tiled);
+    let mut told = |key, value| {
+        let refused = afterlight_techniques::set_param(tiled, &mut params, key, value);
+        refused.expect_err("is refused").to_string()
+    };
+    let expected = r#"parameter "tiles" of tiled-forward: found no such parameter, expected one of: cull, order, tile-px"#;
+    assert_eq!(told("tiles", "3"), expected);
+    let expected = r#"parameter tile-px: found "3", expected a whole number from 8 to 256"#;
+    assert_eq!(told("tile-px", "3"), expected);
+}
+
+#[test]
+fn lights_are_found_by_type() {
+    let of = |id: &str| asked(&params_of(find(id).expect("a technique")));
+    assert_eq!(of("deferred"), Some(Lights::Volumes));
+    assert_eq!(of("dais"), Some(Lights::Auto));
+    assert_eq!(of("tiled"), None);
+    assert_eq!(StepParams::default().light_step().lights, Lights::Auto);
 }

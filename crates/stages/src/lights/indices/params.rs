@@ -1,6 +1,6 @@
 //! Parameters of the stage that packs light indices into pixels.
 
-use afterlight_params::{choices, parameters};
+use afterlight_frame::params::{choices, parameters};
 
 choices! {
     /// Parts of a light's index, of 2 bits and three values each.

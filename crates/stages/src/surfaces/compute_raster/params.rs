@@ -1,6 +1,6 @@
 //! Parameters of the stage that rasterises in compute.
 
-use afterlight_params::{choices, parameters};
+use afterlight_frame::params::{choices, parameters};
 
 choices! {
     /// Who finds the triangles that show.

@@ -1,10 +1,13 @@
 //! Parameters of `visibility`.
 
-use afterlight_params::parameters;
-
-use super::clusters::CellParams;
-use super::compute_raster::ComputeRasterParams;
-use super::light_step::{LightParams, LightStepParams};
+use afterlight_frame::params::parameters;
+use afterlight_stages::{
+    lights::{
+        cells::CellParams,
+        step::{LightParams, LightStepParams},
+    },
+    surfaces::compute_raster::ComputeRasterParams,
+};
 
 parameters! {
     /// Parameters of `visibility`.

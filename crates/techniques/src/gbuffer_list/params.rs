@@ -1,10 +1,13 @@
 //! Parameters of `gbuffer-list`.
 
-use afterlight_params::{AutoOr, Words, choices, parameters};
-
-use super::clusters::CellParams;
-use super::compute_raster::ComputeRasterParams;
-use super::light_step::{LightParams, LightStepParams};
+use afterlight_frame::params::{AutoOr, Words, choices, parameters};
+use afterlight_stages::{
+    lights::{
+        cells::CellParams,
+        step::{LightParams, LightStepParams},
+    },
+    surfaces::compute_raster::ComputeRasterParams,
+};
 
 choices! {
     /// Who builds the lists.

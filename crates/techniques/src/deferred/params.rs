@@ -1,9 +1,10 @@
 //! Parameters of `deferred`.
 
-use afterlight_params::parameters;
-
-use super::clusters::CellParams;
-use super::light_step::{GbufferLightParams, LightStepParams};
+use afterlight_frame::params::parameters;
+use afterlight_stages::lights::{
+    cells::CellParams,
+    step::{GbufferLightParams, LightStepParams},
+};
 
 parameters! {
     /// Parameters of `deferred`.

@@ -1,4 +1,4 @@
-//! What every technique can be asked for: which draws, in what order. Goes beside the list of draws.
+//! What every technique can be asked for: which draws, in what order.
 
 use afterlight_params::{choices, parameters};
 

@@ -1,10 +1,13 @@
 //! Parameters of `dais`.
 
-use afterlight_params::{choices, parameters};
-
-use super::clusters::CellParams;
-use super::compute_raster::ComputeRasterParams;
-use super::light_step::{LightParams, LightStepParams};
+use afterlight_frame::params::{choices, parameters};
+use afterlight_stages::{
+    lights::{
+        cells::CellParams,
+        step::{LightParams, LightStepParams},
+    },
+    surfaces::compute_raster::ComputeRasterParams,
+};
 
 choices! {
     /// Who fills the triangle buffer.

@@ -1,6 +1,6 @@
 //! Parameters of `forward-multipass`.
 
-use afterlight_params::{choices, parameters};
+use afterlight_frame::params::{choices, parameters};
 
 choices! {
     /// What a light's pass covers.

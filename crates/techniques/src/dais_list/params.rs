@@ -1,11 +1,12 @@
 //! Parameters of `dais-list`.
 
-use afterlight_params::{AutoOr, parameters};
+use afterlight_frame::params::{AutoOr, parameters};
+use afterlight_stages::lights::{
+    cells::CellParams,
+    step::{LightParams, LightStepParams},
+};
 
-use super::clusters::CellParams;
-use super::dais::CacheParams;
-use super::dais_multirate::RateParams;
-use super::light_step::{LightParams, LightStepParams};
+use crate::dais::{CacheParams, RateParams};
 
 parameters! {
     /// Parameters of `dais-list`.

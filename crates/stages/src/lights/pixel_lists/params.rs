@@ -1,6 +1,6 @@
 //! Parameters of the stage that lists lights for every pixel.
 
-use afterlight_params::{AutoOr, parameters};
+use afterlight_frame::params::{AutoOr, parameters};
 
 /// Most nodes, below where the count on the device ends.
 const MOST_NODES: u32 = 1 << 30;

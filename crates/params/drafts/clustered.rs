@@ -1,4 +1,0 @@
-//! Parameters of `clustered`.
-
-/// Those of clusters alone.
-pub type ClusteredParams = super::clusters::ClusterParams;

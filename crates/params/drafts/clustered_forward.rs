@@ -1,4 +1,0 @@
-//! Parameters of `clustered-forward`.
-
-/// Those of clusters alone.
-pub type ClusteredForwardParams = super::clusters::ClusterParams;

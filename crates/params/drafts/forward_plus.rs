@@ -1,4 +1,0 @@
-//! Parameters of `forward-plus`.
-
-/// Those of tiles alone.
-pub type ForwardPlusParams = super::clusters::TileParams;

@@ -1,4 +1,0 @@
-//! Parameters of `light-prepass`.
-
-/// It has none of its own.
-pub type LightPrepassParams = afterlight_params::NoParams;

@@ -1,4 +1,0 @@
-//! Parameters of `tiled-forward`.
-
-/// Those of tiles alone.
-pub type TiledForwardParams = super::clusters::TileParams;
