@@ -14,7 +14,7 @@ use criterion::{Criterion, criterion_group, criterion_main};
 /// Techniques with few and with many passes.
 const TECHNIQUES: &[&str] = &["forward", "clustered", "dais"];
 /// Few enough triangles that `cargo test`, which runs a bench once, is not slowed.
-const SCENE: &str = "builtin:colonnade?triangles=5000";
+const SCENE: &str = "builtin:colonnade?triangles=16384";
 
 fn record(c: &mut Criterion) {
     let options =
