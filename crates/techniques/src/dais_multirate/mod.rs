@@ -59,7 +59,7 @@ impl Technique for DaisMultirate {
     }
 
     fn predict(&self, workload: &Workload, _: &Params) -> Cost {
-        crate::dais::cost::dais(workload)
+        dais::cost::dais(workload)
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
