@@ -21,7 +21,7 @@ use afterlight_techniques::{
     scene::{Camera, Light, LightKind, Projection, Scene},
     shader::Shader,
 };
-use common::{Stage, compiled_with_header, image_of, params, psnr, source, wider};
+use common::{Stage, compiled_with_header, image_of, params, psnr, wider};
 use glam::{DVec4, Vec3};
 
 /// The lists of `clustered` with everything kept.

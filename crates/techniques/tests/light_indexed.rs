@@ -9,7 +9,7 @@ use afterlight_techniques::{
     scene::{Light, LightKind},
     shader::Shader,
 };
-use common::{Stage, compiled_with_header, image_of, params, psnr, source};
+use common::{Stage, compiled_with_header, image_of, params, psnr};
 use glam::{DVec3, Vec3};
 
 /// The techniques with the shader that visits the lights.

@@ -2,7 +2,6 @@
 
 mod common;
 
-use std::path::Path;
 
 use afterlight_oracle::raster::{RayScene, pixel_ray};
 use afterlight_techniques::{

@@ -7,7 +7,7 @@ use afterlight_techniques::{
     scene::{Light, LightKind},
     shader::Shader,
 };
-use common::{Stage, compiled_with_header, image_of, params, psnr, source};
+use common::{Stage, compiled_with_header, image_of, params, psnr};
 use glam::Vec3;
 
 /// Lights of all kinds, more than a node of the tree holds.

@@ -14,7 +14,7 @@ use afterlight_techniques::{
     scene::{Light, LightKind},
     shader::Shader,
 };
-use common::{Stage, compiled_with_header, image_of, lights_of_each_kind, psnr, radiance_of, source};
+use common::{Stage, compiled_with_header, image_of, lights_of_each_kind, psnr, radiance_of};
 use glam::Vec3;
 
 /// Writes an image for the eye where `AFTERLIGHT_SHADOW_IMAGES` names a folder.
