@@ -1,8 +1,9 @@
-// Packs the nearest surface of a pixel into four words (source.glsl).
+// Packs the nearest surface of a pixel into four words (layout.glsl). Out: RGBA32UI.
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#include "technique_folder/source.glsl"
+#include "shading.glsl"
 #include "surface_in.glsl"
+#include "technique_folder/layout.glsl"
 
 layout(location = 0) out uvec4 words;
 

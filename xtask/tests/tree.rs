@@ -68,7 +68,7 @@ fn a_sound_tree_has_no_broken_arrow() {
         ),
         ("crates/stages/src/surfaces/geometry/mod.rs", "#[cfg(test)]\nmod tests { use crate::Filled; }\n"),
         ("crates/stages/src/lights/mod.rs", "pub mod step;\n"),
-        ("crates/stages/src/lights/step/mod.rs", "use crate::surfaces::geometry;\n"),
+        ("crates/stages/src/lights/step/mod.rs", "fn light() {}\n"),
         ("crates/stages/src/lights/step/step.glsl", "#include \"shading.glsl\"\n#include \"source\"\n"),
         ("crates/shader/include/shading.glsl", "float shade;\n"),
         ("crates/techniques/src/forward/mod.rs", FORWARD),
@@ -118,45 +118,55 @@ fn a_crate_without_a_rule_is_caught() {
 #[test]
 fn folders_that_use_each_other_are_caught() {
     let root = tree(&[
-        ("crates/stages/src/lib.rs", "pub mod lights;\npub mod surfaces;\npub use lights::cells::Lists;\n"),
-        ("crates/stages/src/lights/mod.rs", "pub mod cells;\n"),
-        ("crates/stages/src/lights/cells/mod.rs", "fn f() {\n    crate::surfaces::gbuffer::fill()\n}\n"),
-        ("crates/stages/src/surfaces/mod.rs", "pub mod gbuffer;\n"),
-        ("crates/stages/src/surfaces/gbuffer/mod.rs", "\nuse crate::{Lists};\n"),
+        ("crates/stages/src/lib.rs", "pub mod surfaces;\npub use surfaces::visible::Visible;\n"),
+        ("crates/stages/src/surfaces/mod.rs", "pub mod gbuffer;\npub mod visible;\n"),
+        ("crates/stages/src/surfaces/visible/mod.rs", "fn f() {\n    crate::surfaces::gbuffer::fill()\n}\n"),
+        ("crates/stages/src/surfaces/gbuffer/mod.rs", "\nuse crate::{Visible};\n"),
     ]);
     let found = broken(root.path());
     assert_eq!(found.len(), 2, "{found:#?}");
-    assert!(found[0].starts_with("crates/stages/src/lights/cells/mod.rs:2: found lights/cells uses surfaces/gbuffer, expected no circle"));
+    assert!(found[0].starts_with(
+        "crates/stages/src/surfaces/gbuffer/mod.rs:2: found surfaces/gbuffer uses surfaces/visible, expected no circle"
+    ));
     assert!(found[1].starts_with(
-        "crates/stages/src/surfaces/gbuffer/mod.rs:2: found surfaces/gbuffer uses lights/cells"
+        "crates/stages/src/surfaces/visible/mod.rs:2: found surfaces/visible uses surfaces/gbuffer"
     ));
 }
 
 #[test]
 fn a_layer_that_looks_up_is_caught() {
-    let root = tree(&[
-        ("crates/stages/src/lights/step/mod.rs", "use crate::compose::present;\n"),
-        ("crates/stages/src/compose/present/mod.rs", ""),
-    ]);
-    expect_one(
-        root.path(),
-        "crates/stages/src/lights/step/mod.rs:1: found lights/step uses compose/present",
-        "surfaces, lights, views",
-    );
+    let above =
+        [("crates/stages/src/compose/present/mod.rs", ""), ("crates/stages/src/surfaces/gbuffer/mod.rs", "")];
+    for (path, folder) in [("compose::present", "compose/present"), ("surfaces::gbuffer", "surfaces/gbuffer")]
+    {
+        let step = format!("use crate::{path};\n");
+        let root = tree(&[above[0], above[1], ("crates/stages/src/lights/step/mod.rs", &step)]);
+        let start = format!("crates/stages/src/lights/step/mod.rs:1: found lights/step uses {folder}");
+        expect_one(root.path(), &start, "only lights");
+    }
 }
 
 #[test]
-fn a_technique_that_uses_its_neighbour_is_caught() {
+fn techniques_that_use_each_other_are_caught() {
     let root = tree(&[
-        ("crates/techniques/src/forward/mod.rs", ""),
+        ("crates/techniques/src/forward/mod.rs", "fn f() {\n    crate::tiled::shade()\n}\n"),
         ("crates/techniques/src/tiled/mod.rs", "use crate::{forward::shade};\n"),
         ("crates/techniques/src/registry.rs", "use crate::{forward, tiled};\n"),
     ]);
-    expect_one(
-        root.path(),
-        "crates/techniques/src/tiled/mod.rs:1: found tiled uses forward",
-        "no other folder",
-    );
+    let found = broken(root.path());
+    assert_eq!(found.len(), 2, "{found:#?}");
+    assert!(found[0].starts_with("crates/techniques/src/forward/mod.rs:2: found forward uses tiled"));
+    assert!(found[1].starts_with("crates/techniques/src/tiled/mod.rs:1: found tiled uses forward"));
+}
+
+#[test]
+fn an_experiment_that_uses_its_neighbour_is_caught() {
+    let root = tree(&[
+        ("crates/experiments/src/kit/mod.rs", ""),
+        ("crates/experiments/src/speed/mod.rs", "use crate::kit;\nuse crate::sweep;\n"),
+        ("crates/experiments/src/sweep/mod.rs", ""),
+    ]);
+    expect_one(root.path(), "crates/experiments/src/speed/mod.rs:2: found speed uses sweep", "only kit");
 }
 
 #[test]
@@ -167,7 +177,7 @@ fn a_shader_of_a_stage_that_includes_a_technique_is_caught() {
     ]);
     expect_one(
         root.path(),
-        "crates/stages/src/lights/cells/cells.glsl:2: found #include \"forward/shade.glsl\"",
+        "crates/stages/src/lights/cells/cells.glsl:2: found `forward/shade.glsl`",
         "never knows who uses it",
     );
 }
@@ -182,10 +192,31 @@ fn a_shared_header_that_includes_a_stage_is_caught() {
 }
 
 #[test]
+fn a_manifest_that_names_what_is_above_it_is_caught() {
+    let manifest = (
+        "crates/stages/src/lights/cells/variants.txt",
+        "# why\ntemplate cells/cells.comp.glsl source=x/mine.glsl ONE\n",
+    );
+    let template = ("crates/stages/src/lights/cells/cells.comp.glsl", "#include \"source\"\n");
+    let root = tree(&[manifest, template, ("crates/techniques/src/x/mine.glsl", "")]);
+    expect_one(
+        root.path(),
+        "crates/stages/src/lights/cells/variants.txt:2: found `x/mine.glsl`",
+        "never knows",
+    );
+    let root = tree(&[manifest, template, ("crates/stages/src/surfaces/x/mine.glsl", "")]);
+    expect_one(
+        root.path(),
+        "crates/stages/src/lights/cells/variants.txt:2: found lights/cells uses surfaces/x",
+        "only lights",
+    );
+}
+
+#[test]
 fn shaders_in_a_circle_are_caught() {
     let root = tree(&[
-        ("crates/stages/src/lights/cells/cells.glsl", "#include \"surfaces/gbuffer/g.glsl\"\n"),
-        ("crates/stages/src/surfaces/gbuffer/g.glsl", "#include \"cells/cells.glsl\"\n"),
+        ("crates/stages/src/lights/cells/cells.glsl", "#include \"lights/bvh/g.glsl\"\n"),
+        ("crates/stages/src/lights/bvh/g.glsl", "#include \"cells/cells.glsl\"\n"),
     ]);
     assert_eq!(broken(root.path()).len(), 2);
 }

@@ -45,7 +45,7 @@ pub fn compares_triangles(view: &str) -> bool {
     [ATTRIBUTE_ERROR, TEXTURE_ERROR].contains(&view)
 }
 
-/// Number of a view in `multisample/shade.glsl`.
+/// Number of a view in `surfaces/shade/shade.glsl`.
 pub fn number(view: &str) -> u32 {
     match view {
         SAMPLE_USAGE => 1,

@@ -6,10 +6,11 @@ use std::time::Instant;
 
 use afterlight_graph::gpu::{Device, DeviceOptions};
 use afterlight_measure::{DeviceRecord, SceneRecord, SettingsRecord};
+use afterlight_renderer::Renderer;
 use afterlight_scene::camera::CameraPath;
 use afterlight_scene::{Camera, LoadOptions, Scene, camera, lights, load_source};
 use afterlight_techniques::cost::Workload;
-use afterlight_techniques::{Effects, Indirect, Renderer, SceneGpu, Settings, Shadows};
+use afterlight_techniques::{Effects, Indirect, SceneGpu, Settings, Shadows};
 
 use crate::spec::SAMPLES;
 use crate::{FrameSpec, LabError, Listener};

@@ -2,8 +2,9 @@
 
 use std::borrow::Borrow;
 
+use afterlight_renderer::Renderer;
 use afterlight_techniques::cost::Workload;
-use afterlight_techniques::{Post, Renderer, Settings};
+use afterlight_techniques::{Post, Settings};
 
 use crate::{Chosen, Entrant, InTurn, LabError, Listener, measure_in_turn, technique};
 

@@ -7,8 +7,9 @@ use afterlight_graph::gpu::{GpuError, Statistics};
 use afterlight_graph::{FrameReport, Plan, PlannedPass, Traffic};
 use afterlight_image::{Rgba8Image, RgbaF32Image};
 use afterlight_measure::{Buffer, CostRecord, Memory, Pass, RunResult, Spread, Status};
+use afterlight_renderer::{Prepared, Renderer};
 use afterlight_techniques::cost::Workload;
-use afterlight_techniques::{Counter, Prepared, Renderer, TechniqueError};
+use afterlight_techniques::{Counter, TechniqueError};
 use serde_json::Value;
 
 use crate::Chosen;

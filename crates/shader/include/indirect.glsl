@@ -1,7 +1,7 @@
 // Indirect light of one bounce from a reflective shadow map (Dachsbacher and Stamminger 2005): every texel of a light's view
 // is a small light, and a point gathers INDIRECT_SAMPLES of them around its own place in that view.
 //
-// CPU twin: crates/oracle/src/rsm.rs. Filled by crates/techniques/src/indirect.
+// CPU twin: crates/oracle/src/rsm.rs. Filled by crates/stages/src/shared/indirect.
 #ifndef AFTERLIGHT_INDIRECT
 #define AFTERLIGHT_INDIRECT
 #include "frame.glsl"

@@ -3,11 +3,11 @@
 #ifndef AFTERLIGHT_LIGHT_PAIRS
 #define AFTERLIGHT_LIGHT_PAIRS
 
-// 1 where pairs are counted; CELL_COLORS where the cells of clusters/ are shown instead.
+// 1 where pairs are counted; CELL_COLORS where the cells of lights/cells/ are shown instead.
 layout(constant_id = 23) const uint LIGHT_PAIRS = 0u;
 const uint CELL_COLORS = 2u;
 
-// The value of one pair. It is small so that RGBA16F holds up to 67 million pairs a pixel instead of 65,504. Twin: LIGHT_PAIR in techniques/src/view/light_pairs.rs.
+// The value of one pair. It is small so that RGBA16F holds up to 67 million pairs a pixel instead of 65,504. Twin: LIGHT_PAIR in crates/frame/src/views.rs.
 const float LIGHT_PAIR = 1.0 / 1024.0;
 
 vec3 light_pair(bool lit) {

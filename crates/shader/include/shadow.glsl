@@ -1,6 +1,6 @@
 // Shadows of one light by a shadow map (Williams 1978), filtered by comparing before averaging (Reeves et al. 1987).
 //
-// CPU twin: crates/oracle/src/shadow.rs. Filled by crates/techniques/src/shadow.
+// CPU twin: crates/oracle/src/shadow.rs. Filled by crates/stages/src/shared/shadow.
 #ifndef AFTERLIGHT_SHADOW
 #define AFTERLIGHT_SHADOW
 #include "frame.glsl"

@@ -1,7 +1,8 @@
 //! Renders a scene with one technique into a PNG: `cargo run --release --example render_image -- SCENE TECHNIQUE FILE`.
 
 use afterlight_image::{Rgba8Image, write_png};
-use afterlight_techniques::{Params, Renderer, Settings, find, graph::gpu, scene};
+use afterlight_renderer::Renderer;
+use afterlight_techniques::{Params, Settings, find, graph::gpu, scene};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut args = std::env::args().skip(1);

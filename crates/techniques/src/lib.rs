@@ -5,7 +5,8 @@
 //! a README. The build collects the folders into [`registry`]. Stages that they are put together from are `afterlight-stages`.
 //!
 //! ```no_run
-//! use afterlight_techniques::{Params, Renderer, Settings, find, graph::gpu};
+//! use afterlight_renderer::Renderer;
+//! use afterlight_techniques::{Params, Settings, find, graph::gpu};
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let device = gpu::Device::open(&gpu::DeviceOptions::default())?;
 //! let scene = afterlight_scene::load_source("builtin:colonnade", &Default::default())?;
@@ -24,7 +25,6 @@ pub use afterlight_frame::{
     completed, device_order, params, params_of, set_param, views,
 };
 pub use afterlight_graph as graph;
-pub use afterlight_renderer::{Prepared, Renderer, supersample};
 pub use afterlight_scene as scene;
 pub use afterlight_shader as shader;
 pub use afterlight_stages as stages;

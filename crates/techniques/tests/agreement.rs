@@ -16,10 +16,21 @@ fn min_psnr(exactness: Exactness) -> f64 {
     }
 }
 
-/// Compares all techniques to `forward`; returns the least margin in dB.
+/// Whether a technique is to be tested: all are, or those that `AFTERLIGHT_TECHNIQUES` lists, such as `tiled,dais`.
+fn is_asked_for(id: &str) -> bool {
+    let asked = std::env::var("AFTERLIGHT_TECHNIQUES").unwrap_or_default();
+    let asked: Vec<&str> = asked.split(',').filter(|id| !id.is_empty()).collect();
+    for id in &asked {
+        assert!(find(id).is_some(), "AFTERLIGHT_TECHNIQUES: found `{id}`, expected a technique's id");
+    }
+    asked.is_empty() || asked.contains(&id)
+}
+
+/// Compares all techniques to `forward`.
 fn all_agree(stage: &Stage, settings: &afterlight_techniques::Settings, what: &str, runs: usize) {
     let reference = stage.image(find("forward").unwrap(), settings);
-    for technique in registry().iter().filter(|t| t.info().samples.contains(&1)) {
+    for technique in registry().iter().filter(|t| t.info().samples.contains(&1) && is_asked_for(t.info().id))
+    {
         let info = technique.info();
         let mut prepared = match stage.try_prepare(*technique, settings, &Params::default()) {
             Ok(prepared) => prepared,

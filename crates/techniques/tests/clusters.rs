@@ -9,12 +9,13 @@ use afterlight_oracle::{
     clusters::{Cell, ClusterView, slice_begins_m},
     tiles::{Decision, light_reaches},
 };
+use afterlight_renderer::{Prepared, Renderer};
 use afterlight_stages::{
     lights::cells::{self, ClusterParams, Division, Slicing, TileParams, VisibleDepths},
     surfaces::gbuffer,
 };
 use afterlight_techniques::{
-    Frame, Info, Params, Prepared, Renderer, SHADERS, Settings, Technique, TechniqueError,
+    Frame, Info, Params, SHADERS, Settings, Technique, TechniqueError,
     cost::{Cost, Workload},
     device_order, find,
     graph::{Graph, ImageHandle, gpu::vk},

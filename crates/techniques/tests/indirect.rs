@@ -7,13 +7,12 @@ use afterlight_oracle::{
     raster::{RayScene, pixel_ray},
     rsm::{Pattern, Rsm},
 };
+use afterlight_renderer::{Prepared, Renderer};
 use afterlight_stages::shared::{
     indirect::{RADIUS, SAMPLES},
     light_view::SourceView,
 };
-use afterlight_techniques::{
-    Exactness, Indirect, Params, Prepared, Renderer, Settings, find, registry, scene::Light,
-};
+use afterlight_techniques::{Exactness, Indirect, Params, Settings, find, registry, scene::Light};
 use common::{Stage, image_of, lights_of_each_kind, psnr};
 use glam::{DVec3, Vec3};
 

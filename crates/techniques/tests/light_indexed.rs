@@ -26,7 +26,7 @@ fn rendered(stage: &Stage, id: &str, settings: &Settings, shader: Option<Shader>
     image_of(&mut stage.prepare_shaders(technique, settings, &Params::default(), shader))
 }
 
-/// A shader that visits the lights, with parts of `light_indices/indices.glsl` replaced.
+/// A shader that visits the lights, with parts of `lights/indices/indices.glsl` replaced.
 fn visits(shader: &str, replaced: &[(&str, &str)]) -> Shader {
     compiled_with_header(shader, "lights/indices/indices.glsl", replaced)
 }

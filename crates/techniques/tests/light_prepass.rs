@@ -3,8 +3,9 @@
 mod common;
 
 use afterlight_image::Rgba8Image;
+use afterlight_renderer::Prepared;
 use afterlight_techniques::{
-    Params, Prepared, Settings, find,
+    Params, Settings, find,
     scene::{self, Light, LightKind, Scene},
     shader::Shader,
 };

@@ -4,8 +4,9 @@ mod common;
 
 use std::path::Path;
 
+use afterlight_renderer::Renderer;
 use afterlight_techniques::{
-    Indirect, Params, Renderer, Settings, find,
+    Indirect, Params, Settings, find,
     graph::{BufferRole, PassRole, gpu},
 };
 use common::{Stage, compiled, params, radiance_of};

@@ -15,9 +15,11 @@ use afterlight_techniques::{
 };
 use serde_json::{Value, json};
 
-/// Every technique's id with its parameters.
+/// The id of every technique that there was when parameters were constants, with its parameters.
 fn techniques() -> Vec<(&'static str, Params)> {
-    registry().iter().map(|technique| (technique.info().id, params_of(*technique))).collect()
+    let before = before();
+    let known = registry().iter().filter(|technique| before.contains_key(technique.info().id));
+    known.map(|technique| (technique.info().id, params_of(*technique))).collect()
 }
 
 /// What `afterlight techniques --json` told of parameters when they were constants.

@@ -3,9 +3,8 @@
 mod common;
 
 use afterlight_image::{Rgba8Image, flip, max_abs};
-use afterlight_techniques::{
-    Exactness, Params, Post, Renderer, SHADERS, Settings, find, registry, shader::Shader, supersample,
-};
+use afterlight_renderer::{Renderer, supersample};
+use afterlight_techniques::{Exactness, Params, Post, SHADERS, Settings, find, registry, shader::Shader};
 use common::{Stage, image_of, psnr};
 
 const FILTERS: [Post; 3] = [Post::Fxaa, Post::Smaa, Post::Sraa];

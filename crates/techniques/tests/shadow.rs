@@ -7,10 +7,10 @@ use afterlight_oracle::{
     raster::{RayScene, pixel_ray},
     shadow,
 };
+use afterlight_renderer::{Prepared, Renderer};
 use afterlight_stages::shared::light_view::SourceView;
 use afterlight_techniques::{
-    Exactness, Indirect, Params, Prepared, Renderer, Settings, Shadows, Technique, Transparency, find,
-    registry,
+    Exactness, Indirect, Params, Settings, Shadows, Technique, Transparency, find, registry,
     scene::{Light, LightKind},
     shader::Shader,
 };

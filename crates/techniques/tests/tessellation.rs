@@ -508,7 +508,7 @@ fn wide_references_give_the_same_image() {
     let gpu = afterlight_testkit::gpu();
     let stage = Stage::new(&gpu, "builtin:colonnade?triangles=60000");
     let dais = find("dais").unwrap();
-    let is_wide = |prepared: &mut afterlight_techniques::Prepared| {
+    let is_wide = |prepared: &mut afterlight_renderer::Prepared| {
         let plan = prepared.executor().plan();
         let [narrow, wide] = ["dais/references", "dais/wide references"].map(|n| plan.resource(n).is_some());
         assert_ne!(narrow, wide, "one layout a frame");

@@ -3,9 +3,10 @@
 mod common;
 
 use afterlight_oracle::raster::{RayScene, pixel_ray};
+use afterlight_renderer::Renderer;
 use afterlight_stages::compose::transparent::SORTED_TRIANGLES_MAX;
 use afterlight_techniques::{
-    Exactness, Frame, Info, Params, Renderer, SHADERS, Settings, Technique, TechniqueError, Transparency,
+    Exactness, Frame, Info, Params, SHADERS, Settings, Technique, TechniqueError, Transparency,
     cost::{Cost, Workload},
     find,
     graph::{BufferRole, Graph, ImageHandle, ImageInfo, Load, PassRole, gpu::vk},
@@ -280,10 +281,10 @@ fn triangles_are_sorted_where_draws_cannot_be() {
     }
 }
 
-/// What `transparent/blend.frag` shades by.
+/// What `compose/transparent/blend.frag` shades by.
 const CALL: &str = "stepped_radiance(s, uvec2(gl_FragCoord.xy))";
 
-/// `transparent/blend.frag` with a part of its text replaced.
+/// `compose/transparent/blend.frag` with a part of its text replaced.
 fn mutant(from: &str, to: &str) -> Shader {
     let path = source("compose/transparent/blend.frag.glsl");
     compiled("compose/transparent/blend.frag", &path, &[], &[(from, to)])
@@ -491,7 +492,7 @@ fn every_technique_agrees_with_forward_through_the_panes_of_the_colonnade() {
             assert!(psnr(&without, &image_of(&mut prepared)) < 40.0, "{}: no panes go unseen", info.id);
 
             // What is shared is not the technique's.
-            let bytes = |prepared: &mut afterlight_techniques::Prepared| {
+            let bytes = |prepared: &mut afterlight_renderer::Prepared| {
                 let report = prepared.run().unwrap_or_else(|e| panic!("{e}"));
                 assert_eq!(
                     report.passes.iter().any(|pass| pass.name == "shared/transparent" && pass.shared),

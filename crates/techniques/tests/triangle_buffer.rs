@@ -5,9 +5,10 @@ mod common;
 use std::{path::Path, sync::Arc};
 
 use afterlight_oracle::packing::unpack_normal;
+use afterlight_renderer::Renderer;
 use afterlight_stages::surfaces::triangles;
 use afterlight_techniques::{
-    Frame, Info, Params, Renderer, SHADERS, SceneGpu, Settings, Technique, TechniqueError,
+    Frame, Info, Params, SHADERS, SceneGpu, Settings, Technique, TechniqueError,
     cost::{Cost, Workload},
     find,
     graph::{

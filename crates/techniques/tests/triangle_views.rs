@@ -2,9 +2,10 @@
 
 mod common;
 
+use afterlight_renderer::Prepared;
 use afterlight_stages::views::{ATTRIBUTE_ERRORS, RECORD_SAMPLES};
 use afterlight_techniques::{
-    Params, Prepared, Settings, Technique, find,
+    Params, Settings, Technique, find,
     graph::gpu,
     scene::{Camera, Projection},
     shader::Shader,

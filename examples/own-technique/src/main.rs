@@ -1,9 +1,10 @@
 //! A technique from outside the workspace: its own shader over Afterlight's G-buffer stage, run beside the built-in ones.
 
 use afterlight_image::{Rgba8Image, write_png};
+use afterlight_renderer::Renderer;
 use afterlight_techniques::stages::surfaces::gbuffer;
 use afterlight_techniques::{
-    Answers, AppendixA, Exactness, Frame, Info, Params, Renderer, Settings, Technique, TechniqueError,
+    Answers, AppendixA, Exactness, Frame, Info, Params, Settings, Technique, TechniqueError,
     cost::{Cost, Workload},
     graph::{
         Graph, ImageHandle, PassRole,

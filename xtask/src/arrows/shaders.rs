@@ -1,4 +1,4 @@
-//! The wall between shaders: what `#include "…"` leads to.
+//! The wall between shaders: what `#include "…"` leads to, and what a manifest's `template … source=…` line does.
 
 use std::path::{Path, PathBuf};
 
@@ -8,13 +8,13 @@ use super::{
 };
 use crate::{Error, read};
 
-/// An include, and the file that it leads to.
+/// A name of a shader's file, and the file that it leads to.
 pub struct Include {
-    /// The file that includes.
+    /// The file that names it: a shader, or a manifest.
     pub file: PathBuf,
     /// Line, from 1.
     pub line: usize,
-    /// The text between the quotes.
+    /// The name as it stands there.
     pub name: String,
     /// The file included.
     pub target: PathBuf,
@@ -22,13 +22,13 @@ pub struct Include {
 
 /// Checks that shaders include those of crates which their own may use.
 pub fn check(root: &Path, table: &Table) -> Result<Vec<Broken>, Error> {
-    let all = files(root, &|path| has_extension(path, "glsl"))?;
+    let all = files(root, &is_shader)?;
     let crate_of = |path: &Path| {
         let path = from_root(root, path);
         path.ancestors().skip(1).map(text).find_map(|folder| table.of(&folder).map(|rule| (folder, rule)))
     };
     let mut broken = Vec::new();
-    for include in includes(&all, &all)? {
+    for include in includes(&files(root, &names_shaders)?, &all)? {
         let (Some((from, rule)), Some((to, _))) = (crate_of(&include.file), crate_of(&include.target)) else {
             continue;
         };
@@ -36,7 +36,7 @@ pub fn check(root: &Path, table: &Table) -> Result<Vec<Broken>, Error> {
             broken.push(Broken {
                 file: from_root(root, &include.file),
                 line: include.line,
-                found: format!("#include \"{}\" of {to}", include.name),
+                found: format!("`{}` of {to}", include.name),
                 expected: format!("shaders of {from} and of what it may use: {}", rule.reason),
             });
         }
@@ -44,30 +44,57 @@ pub fn check(root: &Path, table: &Table) -> Result<Vec<Broken>, Error> {
     Ok(broken)
 }
 
-/// The includes of the shaders in `src` that lead to shaders in `src`.
+/// The includes of the shaders and manifests in `src` that lead to shaders in `src`.
 pub fn includes_within(root: &Path, src: &Path) -> Result<Vec<Include>, Error> {
-    let all = files(root, &|path| has_extension(path, "glsl"))?;
-    let own = files(src, &|path| has_extension(path, "glsl"))?;
+    let all = files(root, &is_shader)?;
+    let own = files(src, &names_shaders)?;
     Ok(includes(&own, &all)?.into_iter().filter(|include| include.target.starts_with(src)).collect())
+}
+
+fn is_shader(path: &Path) -> bool {
+    has_extension(path, "glsl")
+}
+
+fn is_manifest(path: &Path) -> bool {
+    path.file_name().is_some_and(|name| name == "variants.txt")
+}
+
+fn names_shaders(path: &Path) -> bool {
+    is_shader(path) || is_manifest(path)
 }
 
 /// Reads the includes of `from`. One that leads to no file of `all` is a name that each variant gives its own file: it is left out.
 fn includes(from: &[PathBuf], all: &[PathBuf]) -> Result<Vec<Include>, Error> {
     let mut found = Vec::new();
     for file in from {
+        let named =
+            |line| if is_manifest(file) { templates(line) } else { included(line).into_iter().collect() };
         for (index, line) in read(file)?.lines().enumerate() {
-            let Some(name) = included(line) else { continue };
-            if let Some(target) = target(file, name, all) {
-                found.push(Include {
-                    file: file.clone(),
-                    line: index + 1,
-                    name: name.into(),
-                    target: target.clone(),
-                });
+            for name in named(line) {
+                let Some(target) = target(file, name, all) else { continue };
+                let (file, line, target) = (file.clone(), index + 1, target.clone());
+                found.push(Include { file, line, name: name.into(), target });
             }
         }
     }
     Ok(found)
+}
+
+/// The templates and the source that a line of a manifest names.
+fn templates(line: &str) -> Vec<&str> {
+    let mut words = line.split_whitespace();
+    if words.next() != Some("template") {
+        return Vec::new();
+    }
+    let mut names = Vec::new();
+    for word in words {
+        if let Some(source) = word.strip_prefix("source=") {
+            names.push(source);
+            break;
+        }
+        names.push(word);
+    }
+    names
 }
 
 /// The text between the quotes of an include.
@@ -95,6 +122,13 @@ mod tests {
         assert_eq!(included("  # include \"b.glsl\""), Some("b.glsl"));
         assert_eq!(included("// #include \"b.glsl\""), None);
         assert_eq!(included("#define A"), None);
+    }
+
+    #[test]
+    fn templates_of_manifests_are_read() {
+        let line = "template a/b.comp.glsl a/c.frag.glsl source=mine.glsl #tag ONE";
+        assert_eq!(templates(line), ["a/b.comp.glsl", "a/c.frag.glsl", "mine.glsl"]);
+        assert_eq!(templates("fill.frag.glsl #mask ALPHA_MASK"), [""; 0]);
     }
 
     #[test]

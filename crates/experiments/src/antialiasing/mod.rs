@@ -8,9 +8,10 @@ use afterlight_lab::{
     FrameSpec, LabError, Listener, Measured, Session, Setup, differences, measure_setups, technique,
 };
 use afterlight_measure::{RunResult, SCHEMA, Spread, Status};
+use afterlight_renderer::supersample;
 use afterlight_report::text::{self, number_text};
 use afterlight_report::{Picture, bytes_text, ms_text};
-use afterlight_techniques::{Post, supersample};
+use afterlight_techniques::Post;
 use serde::{Deserialize, Serialize};
 
 use crate::kit::{

@@ -12,8 +12,9 @@ use afterlight_lab::{
     FrameSpec, LabError, Listener, Measured, Session, Setup, choose, measure_setups, open_device,
 };
 use afterlight_measure::{Buffer, BufferRole, RunResult, Status};
+use afterlight_renderer::Renderer;
 use afterlight_techniques::cost::Workload;
-use afterlight_techniques::{Indirect, Renderer, find};
+use afterlight_techniques::{Indirect, find};
 use serde::Serialize;
 
 use crate::kit::{MIB, Phase, at_size, check_run, counter, of_role, phase, stand_in};

@@ -12,9 +12,10 @@ use afterlight_lab::{
     Chosen, FrameSpec, LabError, Listener, Measured, Session, Setup, choose, measure_and, renderer_with,
 };
 use afterlight_measure::{RunResult, SCHEMA, Status};
+use afterlight_renderer::Prepared;
 use afterlight_report::Picture;
 use afterlight_report::text::{self, grouped};
-use afterlight_techniques::{Post, Prepared, TechniqueError, registry, view};
+use afterlight_techniques::{Post, TechniqueError, registry, view};
 use serde::{Deserialize, Serialize};
 
 use crate::kit::{

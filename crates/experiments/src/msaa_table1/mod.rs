@@ -14,9 +14,10 @@ use afterlight_lab::{
     Entrant, FrameSpec, LabError, Listener, Session, Setup, measure_in_turn, renderer_with, technique,
 };
 use afterlight_measure::{Buffer, Memory, RunResult, Status};
+use afterlight_renderer::Renderer;
 use afterlight_report::text::{self, grouped, status_text};
 use afterlight_scene::{LoadOptions, load_source};
-use afterlight_techniques::{Params, Renderer, SceneGpu, Settings};
+use afterlight_techniques::{Params, SceneGpu, Settings};
 use serde::{Deserialize, Serialize};
 
 use crate::kit::{

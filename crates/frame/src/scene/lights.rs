@@ -8,7 +8,7 @@ use glam::Vec3;
 use crate::scene::record_image;
 
 /// Lights on the device: those without an end first, so that techniques with light volumes can tell them apart, the others along
-/// a curve that keeps neighbours together (`light_bvh/`).
+/// a curve that keeps neighbours together (`lights/bvh/`).
 pub struct SceneLights {
     /// Four texels a light.
     pub data: gpu::Image,

@@ -5,7 +5,7 @@
 #define AFTERLIGHT_VIEW_RECORDS
 #include "frame.glsl"
 #include "material.glsl"
-#include "surfaces/visible/sample_depth.glsl"
+#include "sample_depth.glsl"
 
 #include "source"
 

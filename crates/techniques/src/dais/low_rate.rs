@@ -68,7 +68,7 @@ fn has_quads(features: &gpu::Features) -> bool {
         && features.subgroup_stages.contains(ShaderStageFlags::COMPUTE)
 }
 
-/// Threads of a group of `multisample/shade.comp`.
+/// Threads of a group of `surfaces/shade/shade.comp`.
 const SHADING_THREADS: u32 = 64;
 
 /// Bytes of shared memory that the shading grid of a group takes: three words for each triangle that may show, three floats a
@@ -77,7 +77,7 @@ fn grid_bytes(threads: u32, samples: u32) -> u32 {
     threads * (12 * samples + 12) + 256
 }
 
-/// Indirect light at a low rate: which of `low_rate.glsl`.
+/// Indirect light at a low rate: which part of `surfaces/low_rate/low_rate.glsl`.
 pub(crate) struct LowRate {
     cell_px: u32,
     quads: bool,

@@ -62,7 +62,7 @@ void store_float(uint word, float value) {
     triangle_buffer[word] = floatBitsToUint(value);
 }
 
-// The layout of triangle_buffer/vertices.glsl.
+// The layout of surfaces/triangles/vertices.glsl.
 void store_vertices(uint record) {
     for (uint i = 0u; i < 3u; ++i) {
         for (uint c = 0u; c < 3u; ++c) {

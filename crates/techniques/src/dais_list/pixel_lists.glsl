@@ -8,7 +8,7 @@
 // Departure: the paper's head is an entry only where one triangle covers every sample.
 #ifndef AFTERLIGHT_LISTS
 #define AFTERLIGHT_LISTS
-#include "surfaces/visible/samples.glsl"
+#include "samples.glsl"
 
 const uint ENTRY = 0x80000000u;
 const uint REFERENCE_BITS = SAMPLES > 8u ? 27u : 28u;

@@ -5,7 +5,7 @@
 // Out, RGBA8 each, since some devices have no multisampled integer formats: 0 base colour (sRGB) and metalness; 1 normal, world
 // space, octahedral, 2 x 12 bits, and roughness (0: takes no light); 2 triangle ID; 3 view distance, m, at the pixel's
 // centre, the upper 24 bits of a positive float (8 exponent, 16 mantissa: 2^-17), and occlusion; with EMISSION 4 radiance,
-// B10G11R11. With NUMBERED geometry/number.geom has numbered the triangles that tessellation made.
+// B10G11R11. With NUMBERED surfaces/geometry/number.geom has numbered the triangles that tessellation made.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shading.glsl"

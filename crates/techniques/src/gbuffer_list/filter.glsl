@@ -1,7 +1,7 @@
 // Which pixels and surfaces keep only one sample (Fridvalszky and Toth 2020, section 5).
 #ifndef AFTERLIGHT_FILTER
 #define AFTERLIGHT_FILTER
-#include "surfaces/visible/samples.glsl"
+#include "samples.glsl"
 
 // Bits of FILTERS: techniques/src/gbuffer_list/filter.rs.
 layout(constant_id = 14) const uint FILTERS = 0u;

@@ -18,7 +18,7 @@
 #define AFTERLIGHT_LIST
 #include "packing.glsl"
 #include "tonemap.glsl"
-#include "surfaces/visible/samples.glsl"
+#include "samples.glsl"
 
 layout(constant_id = 10) const uint POINTER_WORDS = 1u;
 layout(constant_id = 11) const uint DISTANCE_WORDS = 0u;

@@ -7,8 +7,9 @@ use std::{
 };
 
 use afterlight_image::{Rgba8Image, psnr_db};
+use afterlight_renderer::{Prepared, Renderer};
 use afterlight_techniques::{
-    Params, Prepared, Renderer, SceneGpu, Settings, Technique, TechniqueError,
+    Params, SceneGpu, Settings, Technique, TechniqueError,
     graph::gpu,
     params_of,
     scene::{self, Camera, Light, LightKind, Scene, lights::seeded_lights},

@@ -11,7 +11,7 @@ layout(local_size_x = 32) in;   // TREE_WIDTH
 layout(constant_id = 8) const uint LEVEL = 1u;
 layout(set = 0, binding = 8, rgba32f) uniform image2D boxes;
 
-const uint GROUPS_A_ROW = 32768u;    // light_bvh/mod.rs
+const uint GROUPS_A_ROW = 32768u;    // lights/bvh/mod.rs
 shared vec3 lows[TREE_WIDTH];
 shared vec3 highs[TREE_WIDTH];
 

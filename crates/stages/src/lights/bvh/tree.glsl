@@ -1,6 +1,6 @@
 // A tree over the lights with an end (Olsson et al. 2012, section 3.4: a tree 32 wide, complete but for its end, so that no node
 // holds a link). Level 0 are the lights; node i of a level has the children 32 i to 32 i + 31 of the level below; the top level has
-// at most 32 nodes. Lights lie along a Morton curve (techniques/src/lights.rs), so that children are neighbours.
+// at most 32 nodes. Lights lie along a Morton curve (crates/frame/src/scene/lights.rs), so that children are neighbours.
 //
 // Departure: the lights are put in order when they are uploaded, not in every frame; boxes are made anew in every frame
 // (boxes.comp), so that a light that moves makes boxes larger, and no result wrong.

@@ -1,6 +1,6 @@
 // Finds the cells that hold a surface: a group a tile.
 //
-// In: what surfaces.glsl reads. Out: Cells; CellWords: bits of the slices, number of cells before
+// In: what the source reads. Out: Cells; CellWords: bits of the slices, number of cells before
 // them; CellCount: cells in all, and those without room. Numbers of cells depend on the order in which groups run; lists do not.
 #version 460
 #extension GL_GOOGLE_include_directive : require

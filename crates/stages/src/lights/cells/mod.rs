@@ -1,7 +1,7 @@
 //! The stage that gives every part of the view that holds a surface its list of lights (Petrescu et al. 2016, sections 4.8 to 4.10).
 //!
 //! The view is divided into cells: tiles, tiles with 32 bits of depth, or clusters, tiles cut into slices of view distance. A pass finds
-//! the cells that hold a surface; another walks down the tree over the lights (`light_bvh/`) for each of them. No list has a bound:
+//! the cells that hold a surface; another walks down the tree over the lights (`lights/bvh/`) for each of them. No list has a bound:
 //! what is found is counted before it is written, and a frame that had less room is recorded again.
 
 use afterlight_graph::{BufferHandle, BufferRole, ComputePass, Graph, ImageHandle, PassRole};
@@ -111,7 +111,7 @@ impl<'a> VisibleDepths<'a> {
         format!("{}/{template}{}", self.folder.unwrap_or(stage), self.tag)
     }
 
-    /// Binds what a shader with `surfaces.glsl` reads.
+    /// Binds what the source of a template reads.
     pub fn bind(&self, shader: &Shader, pass: &mut ComputePass<'_>) {
         if shader.reflection.spec_constant("SAMPLES").is_some() {
             pass.constant("SAMPLES", self.samples);
@@ -132,7 +132,7 @@ impl<'a> VisibleDepths<'a> {
 
 /// Lists of lights of cells.
 pub struct CellLists {
-    /// Specialization constants of `clusters/grid.glsl`.
+    /// Specialization constants of `lights/cells/grid.glsl`.
     constants: Vec<(&'static str, u32)>,
     tree: LightBvh,
     /// A cell each: number, nearest and farthest view distance in m, steps that hold a surface; `Cell` in `grid.glsl`.
@@ -146,7 +146,7 @@ pub struct CellLists {
 }
 
 impl CellLists {
-    /// Binds what `clusters/lists.glsl` reads.
+    /// Binds what `lights/cells/cell_lists.glsl` reads.
     pub fn bind(&self, frame: &Frame<'_>, pass: &mut impl Slots) {
         pass.read_buffer("Cells", &self.cells);
         pass.read_buffer("CellWords", &self.words);
@@ -155,7 +155,7 @@ impl CellLists {
         self.tree.bind(frame, pass);
     }
 
-    /// Specialization constants of what includes `clusters/lists.glsl`.
+    /// Specialization constants of what includes `lights/cells/cell_lists.glsl`.
     pub fn constants(&self) -> &[(&'static str, u32)] {
         &self.constants
     }

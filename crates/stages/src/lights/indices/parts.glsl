@@ -5,7 +5,7 @@
 // channel's integer, that of the light before it the next two bits, and so on. Eight bits are read, six
 // of them after the point, where a float from 2 to 4 has nine: older lights leave three bits and what rounding makes of the rest.
 // As their parts are no 3 either, that stays below 3/4 of the last bit that is read, and rounding cannot carry into it.
-// Twin: tests of light_indices/mod.rs.
+// Twin: tests of lights/indices/mod.rs.
 #ifndef AFTERLIGHT_LIGHT_PARTS
 #define AFTERLIGHT_LIGHT_PARTS
 

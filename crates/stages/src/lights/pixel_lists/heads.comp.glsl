@@ -1,6 +1,6 @@
 // Empties the lists of all pixels, and leaves in each the view distances between which its surfaces lie.
 //
-// In: what clusters/surfaces.glsl reads. Out: LightHeads. Dispatch: 8x8 groups.
+// In: what the source reads. Out: LightHeads. Dispatch: 8x8 groups.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "frame.glsl"

@@ -113,12 +113,12 @@ fn empty_heads(
 }
 
 impl LightLists {
-    /// Specialization constant of what includes `lists.glsl`.
+    /// Specialization constant of what includes `pixel_lists.glsl`.
     pub fn constant(&self) -> (&'static str, u32) {
         ("LISTS_SAMPLED", u32::from(self.sampled))
     }
 
-    /// Binds what `lists.glsl` reads.
+    /// Binds what `pixel_lists.glsl` reads.
     pub fn bind(&self, frame: &Frame<'_>, pass: &mut impl Slots) {
         pass.read_buffer("LightHeads", &self.heads);
         pass.read_buffer("LightNodes", &self.nodes);

@@ -4,7 +4,7 @@
 #include "lights/cells/cell_lists.glsl"
 #include "lights/pixel_lists/pixel_lists.glsl"
 
-// light_step/mod.rs
+// lights/step/mod.rs
 const uint STEP_ALL = 0u;       // all
 const uint STEP_CELLS = 1u;     // those on the list of its cell: tiles, tiles with bits of depth, clusters
 const uint STEP_TREE = 2u;      // those that the tree over the lights leads to

@@ -1,5 +1,5 @@
 //! A light's view of the scene: which light it is, and how a frame looks through it. What indirect light is gathered from
-//! (`indirect/`) and shadows (`shadow/`) are passes through it.
+//! (`shared/indirect/`) and shadows (`shared/shadow/`) are passes through it.
 
 use std::f32::consts::PI;
 

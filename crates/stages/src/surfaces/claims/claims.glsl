@@ -1,7 +1,7 @@
 // Which fragment has a sample, where the stencil bit cannot tell.
 #ifndef AFTERLIGHT_CLAIMS
 #define AFTERLIGHT_CLAIMS
-#include "surfaces/visible/samples.glsl"
+#include "samples.glsl"
 
 #ifdef ALPHA_MASK
 // Samples that a masked surface of the pixel has taken, 8 bits a pixel, 16 at 16 samples. Early tests come before the alpha

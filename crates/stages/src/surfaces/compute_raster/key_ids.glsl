@@ -1,7 +1,7 @@
 // Triangle IDs from the keys that compute_raster leaves. Needs frame.glsl, scene.glsl; SAMPLES_IN_KEYS.
 #ifndef AFTERLIGHT_KEY_IDS
 #define AFTERLIGHT_KEY_IDS
-#include "surfaces/visible/samples.glsl"
+#include "samples.glsl"
 
 // VkDrawIndexedIndirectCommand: index count, 1, first index, vertex offset, draw.
 layout(set = 0, binding = 9, scalar) readonly buffer DrawCommands {

@@ -10,7 +10,7 @@
 #define EXPLICIT_GRADIENTS
 #include "frame.glsl"
 #include "triangle.glsl"
-#include "surfaces/visible/samples.glsl"
+#include "samples.glsl"
 
 // One key for each sample; the keys of a pixel are neighbours.
 layout(set = 0, binding = 8, scalar) buffer SampleKeys {

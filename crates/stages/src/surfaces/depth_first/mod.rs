@@ -87,7 +87,7 @@ pub fn shaded_surfaces(frame: &Frame<'_>) -> Result<SceneDraws, TechniqueError> 
     }
 }
 
-/// Declares the pass `technique/shade`: forward shading where depth, which [`afterlight_techniques::depth_prepass`] has drawn, is equal. Returns
+/// Declares the pass `technique/shade`: forward shading where depth, which [`draw_depth`] has drawn, is equal. Returns
 /// radiance, the samples of a pixel averaged.
 ///
 /// # Errors

@@ -20,7 +20,7 @@ use afterlight_frame::{
 
 /// Shaders of one kind of surface.
 pub struct SurfaceShaders {
-    /// Vertex shader, a variant of `geometry/surface.vert`.
+    /// Vertex shader, a variant of `surfaces/geometry/surface.vert`.
     pub vertex: Shader,
     /// Tessellation control and evaluation shaders, where the frame is tessellated.
     pub tessellation: Option<(Shader, Shader)>,
@@ -137,7 +137,7 @@ impl SceneDraws {
         Ok(self)
     }
 
-    /// As [`Self::numbered`], and hands every fragment its whole triangle (`geometry/whole_triangle.glsl`).
+    /// As [`Self::numbered`], and hands every fragment its whole triangle (`surfaces/geometry/whole_triangle.glsl`).
     ///
     /// # Errors
     /// A device that counts in no geometry shader.

@@ -8,7 +8,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #ifdef WHOLE_TRIANGLE
-#include "surfaces/triangles/vertices.glsl"
+#include "surfaces/geometry/packed_normals.glsl"
 #define THROUGH out
 #include "surfaces/geometry/whole_triangle.glsl"
 #endif

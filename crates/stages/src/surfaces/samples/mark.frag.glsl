@@ -3,7 +3,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "frame.glsl"
-#include "surfaces/visible/samples.glsl"
+#include "samples.glsl"
 #include "surfaces/samples/edge_mark.glsl"
 
 void main() {

@@ -15,7 +15,7 @@ use afterlight_frame::{Frame, Slots, SourceSlots, TechniqueError, set_constants,
 /// Views of techniques that end in [`shade`].
 pub const VIEWS: &[&str] = &[views::SAMPLE_USAGE, views::INVOCATIONS, views::EDGES, views::WEIGHTS];
 
-/// Specialization constants of shaders that include `multisample/shade.glsl`.
+/// Specialization constants of shaders that include `surfaces/shade/shade.glsl`.
 pub fn shade_constants(frame: &Frame<'_>, samples: u32) -> [(&'static str, u32); 2] {
     [("SAMPLES", samples), ("VIEW", views::number(frame.view))]
 }

@@ -1,4 +1,4 @@
-// Shades and resolves one pixel in each thread: every surface of the source once, by the lights that light_step/ finds for it. With
+// Shades and resolves one pixel in each thread: every surface of the source once, by the lights that lights/step/ finds for it. With
 // LOW_RATE neighbouring pixels share the irradiance of indirect light.
 //
 // In: the source's images or buffers, gbuffer_depth. Out: hdr, RGBA16F, radiance. Dispatch: 8x8 groups.

@@ -5,7 +5,7 @@
 // number of samples without a surface. Weights are numbers of samples; they and the background sum to SAMPLES.
 #include "shading.glsl"
 #include "heat.glsl"
-#include "surfaces/visible/sample_depth.glsl"
+#include "sample_depth.glsl"
 
 #include "source"
 

@@ -32,7 +32,7 @@ pub struct Records {
 }
 
 impl Records {
-    /// Binds what `triangle_buffer/interpolate.glsl` reads.
+    /// Binds what `surfaces/triangles/interpolate.glsl` reads.
     pub fn bind(&self, pass: &mut (impl Slots + ?Sized)) {
         pass.read_buffer("TriangleBuffer", &self.words);
     }
@@ -48,7 +48,7 @@ pub struct TriangleBuffer {
 }
 
 impl TriangleBuffer {
-    /// Binds what `triangle_buffer/index.glsl` and `triangle_buffer/interpolate.glsl` read.
+    /// Binds what `surfaces/triangles/index.glsl` and `surfaces/triangles/interpolate.glsl` read.
     pub fn bind(&self, pass: &mut (impl Slots + ?Sized)) {
         self.records.bind(pass);
         pass.read_buffer("VisibleBits", &self.bits);

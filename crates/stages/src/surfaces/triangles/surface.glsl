@@ -1,4 +1,4 @@
-// Surfaces of a pixel for multisample/shade.glsl from a source of triangles: source_next_triangle(name, weight), source_place(name).
+// Surfaces of a pixel for surfaces/shade/shade.glsl from a source of triangles: source_next_triangle(name, weight), source_place(name).
 #ifndef AFTERLIGHT_TRIANGLE_SURFACE
 #define AFTERLIGHT_TRIANGLE_SURFACE
 #include "surfaces/triangles/interpolate.glsl"

@@ -8,31 +8,7 @@
 //   word 19      lengths of the normals over that of the longest, 3 x 10 bits
 //
 // then, where the scene has them, second texture coordinates, two words a vertex, and vertex colours, four.
-//
-// Normals of displaced surfaces are not of unit length, and interpolation weighs them by their lengths: unit ones bend otherwise.
 #ifndef AFTERLIGHT_TRIANGLE_VERTICES
 #define AFTERLIGHT_TRIANGLE_VERTICES
-#include "packing.glsl"
-
-const float LENGTH_STEPS = 1023.0;
-
-uint packed_direction(vec3 n) {
-    return packSnorm2x16(dot(n, n) > 0.0 ? octahedral_encode(n) : vec2(0.0));
-}
-
-// Three directions and their lengths.
-uvec4 packed_normals(vec3 n0, vec3 n1, vec3 n2) {
-    vec3 lengths = vec3(length(n0), length(n1), length(n2));
-    float longest = max(max(lengths.x, lengths.y), lengths.z);
-    uvec3 steps = uvec3(round(lengths * (LENGTH_STEPS / max(longest, 1e-30))));
-    return uvec4(packed_direction(n0), packed_direction(n1), packed_direction(n2),
-                 steps.x | steps.y << 10 | steps.z << 20);
-}
-
-// Normals, a column a vertex, the longest of unit length.
-mat3 unpacked_normals(uvec4 bits) {
-    vec3 lengths = vec3(bits.w & 0x3ffu, bits.w >> 10 & 0x3ffu, bits.w >> 20) / LENGTH_STEPS;
-    return mat3(unpack_normal(bits.x) * lengths.x, unpack_normal(bits.y) * lengths.y, unpack_normal(bits.z) * lengths.z);
-}
-
+#include "surfaces/geometry/packed_normals.glsl"
 #endif

@@ -15,7 +15,7 @@ use afterlight_frame::{Frame, Slots, TechniqueError};
 /// What a pixel without a surface holds in an image of triangle IDs: `NO_TRIANGLE`, all ones.
 pub const NO_TRIANGLE_RGBA8: [f32; 4] = [1.0; 4];
 
-/// What samples show, as `multisample/triangles.glsl` reads it: triangle IDs, or keys of [`compute_raster`].
+/// What samples show, as `surfaces/visible/triangles.glsl` reads it: triangle IDs, or keys of [`compute_raster`].
 pub enum Visible {
     /// Triangle IDs, four bytes as RGBA8, and depth, of `samples` samples a pixel.
     Ids {

@@ -1,7 +1,7 @@
 // The triangles that samples show: IDs, or the keys of compute_raster (SAMPLES_IN_KEYS). Needs frame.glsl, scene.glsl; IDS_BINDING.
 #ifndef AFTERLIGHT_TRIANGLES
 #define AFTERLIGHT_TRIANGLES
-#include "surfaces/visible/samples.glsl"
+#include "samples.glsl"
 
 #ifdef SAMPLES_IN_KEYS
 #include "surfaces/compute_raster/key_ids.glsl"

@@ -14,7 +14,7 @@ layout(constant_id = 8) const uint SAMPLES = 4u;
 #endif
 
 #ifdef SAMPLES_IN_KEYS
-// Two words a sample (compute_raster/mod.rs): the complement of its triangle's place in the order of draws, its depth.
+// Two words a sample (crates/stages, surfaces/compute_raster): the complement of its triangle's place in the order of draws, its depth.
 layout(set = 0, binding = 8, scalar) readonly buffer SampleKeys {
     uint sample_keys[];
 };

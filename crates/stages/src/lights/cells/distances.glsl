@@ -1,7 +1,7 @@
-// View distances of the surfaces of a pixel from the depth at its samples: a source for templates that ask where surfaces stand.
+// View distances of the surfaces of a pixel from the depth at its samples: the stages' own source for templates that ask where surfaces stand.
 #ifndef AFTERLIGHT_DISTANCES
 #define AFTERLIGHT_DISTANCES
-#include "surfaces/visible/sample_depth.glsl"
+#include "sample_depth.glsl"
 
 void visit_distance(float distance_m);
 

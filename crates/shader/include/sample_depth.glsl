@@ -1,7 +1,7 @@
 // Depth at the samples of a pixel. Needs frame.glsl.
 #ifndef AFTERLIGHT_SAMPLE_DEPTH
 #define AFTERLIGHT_SAMPLE_DEPTH
-#include "surfaces/visible/samples.glsl"
+#include "samples.glsl"
 
 #ifndef SAMPLES_IN_KEYS
 layout(set = 0, binding = 8) uniform SAMPLED_IMAGE gbuffer_depth;
