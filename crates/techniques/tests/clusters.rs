@@ -22,7 +22,7 @@ use afterlight_techniques::{
     scene::{Camera, Light, LightKind, Projection, Scene},
     shader::Shader,
 };
-use common::{Stage, compiled_with_header, image_of, params, psnr, sources, wider};
+use common::{Stage, compiled_with_header, image_of, params, psnr, wider};
 use glam::{DVec4, Vec3};
 
 /// The lists of `clustered` with everything kept.
@@ -53,7 +53,7 @@ impl Technique for Lists {
 
 /// A shader of `folder/file` with text replaced in a header of the stage.
 fn mutant(name: &str, header: &str, from: &str, to: &str) -> Shader {
-    compiled_with_header(name, (&sources(), header), &[(from, to)])
+    compiled_with_header(name, header, &[(from, to)])
 }
 
 fn prepare(stage: &Stage, technique: &dyn Technique, settings: &Settings, shaders: &[Shader]) -> Prepared {

@@ -4,7 +4,6 @@ use afterlight_techniques::clustered::cost::clustered_deferred;
 use afterlight_techniques::clustered_forward::cost::clustered_forward;
 use afterlight_techniques::cost::{Cost, Workload};
 use afterlight_techniques::dais::cost::{dais, dais_cached};
-use afterlight_techniques::dais_list::cost::dais_list;
 use afterlight_techniques::deferred::cost::deferred;
 use afterlight_techniques::deferred_dedup::cost::deferred_dedup;
 use afterlight_techniques::deferred_msaa::cost::deferred_msaa;

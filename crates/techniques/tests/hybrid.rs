@@ -8,7 +8,7 @@ use afterlight_techniques::{
     scene::{self, Scene},
     shader::Shader,
 };
-use common::{Stage, compiled, image_of, params, psnr, sources};
+use common::{Stage, compiled, image_of, params, psnr, source};
 
 /// Least PSNR to `forward`, dB.
 const MIN_PSNR_DB: f64 = 50.0;
@@ -96,7 +96,7 @@ fn colors_of_both_paths_are_needed() {
         ("light_prepass/material.frag", "gathered_radiance(s)", "vec3(0.0)"),
         ("light_prepass/material.frag", "gathered_radiance(s)", "2.0 * gathered_radiance(s)"),
     ] {
-        let shader = compiled(file, &sources().join(format!("{file}.glsl")), &[], &[(from, to)]);
+        let shader = compiled(file, &source(&format!("{file}.glsl")), &[], &[(from, to)]);
         let db = psnr(&reference, &rendered(&stage, &settings, &sets, Some(shader)).0);
         println!("{file}: {to}: {db:.2} dB");
         assert!(db < 45.0, "{file}: {to}: a mutant within the bound, {db:.2} dB");

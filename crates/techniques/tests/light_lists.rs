@@ -9,7 +9,7 @@ use afterlight_techniques::{
     scene::{Camera, Light, LightKind},
     shader::Shader,
 };
-use common::{Stage, compiled, image_of, params, psnr, sources};
+use common::{Stage, compiled, image_of, params, psnr, source};
 use glam::Vec3;
 
 const TECHNIQUES: [&str; 2] = ["light-list", "light-list-forward"];
@@ -32,7 +32,7 @@ fn rendered(
 
 /// `append.frag` with a part of its text replaced.
 fn mutant(from: &str, to: &str) -> Shader {
-    let path = sources().join("lights/pixel_lists/append.frag.glsl");
+    let path = source("lights/pixel_lists/append.frag.glsl");
     compiled("lights/pixel_lists/append.frag#one", &path, &["ONE_DEPTH"], &[(from, to)])
 }
 

@@ -2,7 +2,6 @@
 
 mod common;
 
-use std::path::Path;
 
 use afterlight_oracle::raster::{RayScene, pixel_ray};
 use afterlight_techniques::{
@@ -91,8 +90,7 @@ fn off(found: &[[f64; 2]], seen: &[Option<Seen>]) -> (usize, usize) {
 
 /// `forward/forward.frag` with a part of a header of all shaders replaced.
 fn mutant(header: &str, from: &str, to: &str) -> Shader {
-    let include = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shader/include");
-    compiled_with_header("surfaces/depth_first/forward.frag", (&include, header), &[(from, to)])
+    compiled_with_header("surfaces/depth_first/forward.frag", header, &[(from, to)])
 }
 
 #[test]

@@ -10,7 +10,7 @@ use afterlight_techniques::{
     shader::Shader,
 };
 use common::{
-    Stage, compiled, compiled_with_header, image_of, lights_of_each_kind, psnr, radiance_of, sources,
+    Stage, compiled, compiled_with_header, image_of, lights_of_each_kind, psnr, radiance_of, source,
 };
 use glam::Vec3;
 
@@ -19,7 +19,7 @@ const MIN_PSNR_DB: f64 = 60.0;
 
 /// `light_prepass/FILE` with a part of its text replaced.
 fn mutant(file: &str, from: &str, to: &str) -> Shader {
-    let path = sources().join("light_prepass").join(format!("{file}.glsl"));
+    let path = source(&format!("light_prepass/{file}.glsl"));
     compiled(&format!("light_prepass/{file}"), &path, &[], &[(from, to)])
 }
 
@@ -103,7 +103,7 @@ fn sums_beyond_their_format_stay_numbers() {
     assert_eq!(not_numbers(None), 0);
     let unbounded = compiled_with_header(
         "light_prepass/material.frag",
-        (&sources(), "light_prepass/sums.glsl"),
+        "light_prepass/sums.glsl",
         &[(
             "min(texelFetch(light, ivec2(gl_FragCoord.xy), 0).rgb, vec3(65504.0))",
             "texelFetch(light, ivec2(gl_FragCoord.xy), 0).rgb",

@@ -12,7 +12,7 @@ use afterlight_techniques::{
     scene::{Camera, Scene},
     shader::Shader,
 };
-use common::{Stage, compiled, image_of, params, psnr, sources};
+use common::{Stage, compiled, image_of, params, psnr, source};
 use glam::{Affine3A, Quat, Vec3};
 
 /// Least PSNR of what must be one image, dB (contract: each full-rate variant to `deferred-dedup`).
@@ -263,7 +263,7 @@ fn image_with(
 /// A variant of the shader in a file with a part of its text replaced.
 fn mutant(file: &str, tag: &str, defines: &[&str], from: &str, to: &str) -> Shader {
     let name = format!("{}{tag}", file.trim_end_matches(".glsl"));
-    compiled(&name, &sources().join(file), defines, &[(from, to)])
+    compiled(&name, &source(file), defines, &[(from, to)])
 }
 
 /// Cracks are seen where there are some: displacement along normals parts the sides of the room, edges divided by what is

@@ -16,7 +16,7 @@ use afterlight_techniques::{
     },
     shader::Shader,
 };
-use common::{Stage, compiled, image_of, lights_of_each_kind, psnr, radiance_of, sources};
+use common::{Stage, compiled, image_of, lights_of_each_kind, psnr, radiance_of, source};
 use glam::{Affine3A, DVec3, Quat, Vec3};
 
 /// Squares that face +z of their own space, one mesh, placed in the world.
@@ -286,7 +286,7 @@ const CALL: &str = "stepped_radiance(s, uvec2(gl_FragCoord.xy))";
 
 /// `compose/transparent/blend.frag` with a part of its text replaced.
 fn mutant(from: &str, to: &str) -> Shader {
-    let path = sources().join("compose/transparent/blend.frag.glsl");
+    let path = source("compose/transparent/blend.frag.glsl");
     compiled("compose/transparent/blend.frag", &path, &[], &[(from, to)])
 }
 

@@ -18,7 +18,7 @@ use afterlight_techniques::{
     scene::{Aabb, Camera, Instance, Material, Mesh, Scene, VertexAttributes, rng::SplitMix64},
     shader::Shader,
 };
-use common::{compiled, sources};
+use common::{compiled, source};
 use glam::{Affine3A, DMat4, DVec2, DVec3, DVec4, Vec3};
 
 /// Triangles of a draw; every draw is full, so that bits, IDs and places are one.
@@ -294,7 +294,7 @@ impl<'a> Stage<'a> {
         let name = "surfaces/triangles/derivatives.comp";
         renderer.add_shaders([
             compiled("test/attributes.comp", &tests.join("attributes.comp.glsl"), &[], &[]),
-            compiled(name, &sources().join(format!("{name}.glsl")), &[], mutant),
+            compiled(name, &source(&format!("{name}.glsl")), &[], mutant),
         ]);
         let technique =
             Records { pixels: self.triangles.iter().map(|t| t.pixel[0] | t.pixel[1] << 16).collect() };

@@ -11,7 +11,7 @@ use afterlight_techniques::{
     shader::Shader,
     views,
 };
-use common::{Stage, compiled, params, sources};
+use common::{Stage, compiled, params, source};
 
 /// Techniques whose samples refer to triangle records, in every way that they fill them.
 const WAYS: &[(&str, &[(&str, &str)])] = &[
@@ -210,7 +210,7 @@ fn wrong_records_are_seen() {
         ("by * (inverse_det * pixel_ndc.y)", "by * (inverse_det * -pixel_ndc.y)"),
         ("vec2 ndc = (anchor + 0.5)", "vec2 ndc = (anchor + 1.5)"),
     ] {
-        let path = sources().join("surfaces/triangles/derivatives.comp.glsl");
+        let path = source("surfaces/triangles/derivatives.comp.glsl");
         let name = "surfaces/triangles/derivatives.comp#ids";
         let mutant = compiled(name, &path, &["RECORD_IDS"], &[replaced]);
         let mut prepared = prepared(&stage, &settings, &way, Some(mutant));

@@ -158,9 +158,15 @@ pub fn wider(lights: &[Light], factor: f32) -> Vec<Light> {
     lights.iter().map(|l| Light { range_m: l.range_m * factor, ..*l }).collect()
 }
 
-/// Folder of this crate's shaders.
-pub fn sources() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
+/// Folders of shaders: of techniques, of stages, and the headers that all share.
+fn folders() -> [PathBuf; 3] {
+    ["src", "../stages/src", "../shader/include"].map(|folder| Path::new(env!("CARGO_MANIFEST_DIR")).join(folder))
+}
+
+/// Path of a shader or a header by the name that includes give it.
+pub fn source(name: &str) -> PathBuf {
+    let mut paths = folders().into_iter().map(|folder| folder.join(name));
+    paths.find(|path| path.is_file()).unwrap_or_else(|| panic!("{name}: found no such shader, expected one of techniques or stages"))
 }
 
 /// Text of a shader with parts replaced.
@@ -183,19 +189,14 @@ pub fn compiled(name: &str, path: &Path, defines: &[&str], replaced: &[(&str, &s
     })
 }
 
-/// Compiles a shader of this crate with parts of a header's text replaced: `header` is what shaders include of what stands in
-/// `folder`.
-pub fn compiled_with_header(
-    name: &str,
-    (folder, header): (&Path, &str),
-    replaced: &[(&str, &str)],
-) -> Shader {
+/// Compiles a shader with parts of a header's text replaced: `header` is the name by which shaders include it.
+pub fn compiled_with_header(name: &str, header: &str, replaced: &[(&str, &str)]) -> Shader {
     in_temporary_folder(|changed| {
         let written = changed.join(header);
         std::fs::create_dir_all(written.parent().expect("a folder")).expect("a temporary folder");
-        let text = replaced_text(&folder.join(header), replaced);
+        let text = replaced_text(&source(header), replaced);
         std::fs::write(&written, text).expect("a file in the temporary folder");
-        let path = sources().join(format!("{name}.glsl"));
+        let path = source(&format!("{name}.glsl"));
         compile(name, &path, path.parent().expect("a folder"), &[], changed)
     })
 }
@@ -221,6 +222,7 @@ fn compile(name: &str, path: &Path, folder: &Path, defines: &[&str], first: &Pat
         source: None,
         defines: defines.iter().map(|d| ((*d).to_owned(), None)).collect(),
     };
-    let compiler = Compiler::new().override_dir(first).include_dir(sources());
+    let [techniques, stages, _] = folders();
+    let compiler = Compiler::new().override_dir(first).include_dir(techniques).include_dir(stages);
     compiler.compile(&variant).unwrap_or_else(|e| panic!("{e}")).shader
 }
