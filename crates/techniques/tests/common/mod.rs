@@ -160,13 +160,16 @@ pub fn wider(lights: &[Light], factor: f32) -> Vec<Light> {
 
 /// Folders of shaders: of techniques, of stages, and the headers that all share.
 fn folders() -> [PathBuf; 3] {
-    ["src", "../stages/src", "../shader/include"].map(|folder| Path::new(env!("CARGO_MANIFEST_DIR")).join(folder))
+    ["src", "../stages/src", "../shader/include"]
+        .map(|folder| Path::new(env!("CARGO_MANIFEST_DIR")).join(folder))
 }
 
 /// Path of a shader or a header by the name that includes give it.
 pub fn source(name: &str) -> PathBuf {
     let mut paths = folders().into_iter().map(|folder| folder.join(name));
-    paths.find(|path| path.is_file()).unwrap_or_else(|| panic!("{name}: found no such shader, expected one of techniques or stages"))
+    paths
+        .find(|path| path.is_file())
+        .unwrap_or_else(|| panic!("{name}: found no such shader, expected one of techniques or stages"))
 }
 
 /// Text of a shader with parts replaced.
