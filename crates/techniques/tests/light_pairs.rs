@@ -2,7 +2,6 @@
 
 mod common;
 
-
 use afterlight_oracle::raster::{RayScene, pixel_ray};
 use afterlight_techniques::{
     Exactness, Frame, Info, LightPairs, Params, SHADERS, Settings, Technique, TechniqueError,
