@@ -11,7 +11,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "frame.glsl"
-#include "displacement.glsl"
+#include "surfaces/geometry/displacement.glsl"
 
 // Vulkan looks at the patch with the origin in the upper left corner: clockwise there is the order of the three vertices.
 layout(triangles, equal_spacing, cw) in;
