@@ -4,7 +4,7 @@ mod common;
 
 use afterlight_image::{Rgba8Image, flip, max_abs};
 use afterlight_renderer::{Renderer, supersample};
-use afterlight_techniques::{Exactness, Params, Post, SHADERS, Settings, find, registry, shader::Shader};
+use afterlight_techniques::{Exactness, Params, Post, Settings, find, registry, shader::Shader};
 use common::{Stage, image_of, psnr};
 
 const FILTERS: [Post; 3] = [Post::Fxaa, Post::Smaa, Post::Sraa];
@@ -80,8 +80,7 @@ fn exchanged_weights_are_caught() {
         let settings = stage.settings((160, 90), 0).with_effects(|effects| effects.post.filter = Post::Smaa);
         let reference = supersampled(&stage, &settings);
         let mut renderer = Renderer::with_scene(&stage.device, stage.uploaded.clone(), &settings).unwrap();
-        let swapped =
-            SHADERS.iter().find(|s| s.name == "compose/post/smaa_blend.comp#swapped").expect("a variant");
+        let swapped = afterlight_stages::shader("compose/post/smaa_blend.comp#swapped").expect("a variant");
         renderer.add_shaders([Shader { name: "compose/post/smaa_blend.comp".into(), ..swapped.clone() }]);
         let mut prepared = renderer.prepare(find("forward").unwrap(), &Params::default()).unwrap();
         let mutant = mean_flip(&reference, &image_of(&mut prepared));

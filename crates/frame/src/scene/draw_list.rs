@@ -99,6 +99,7 @@ impl DrawList {
     }
 }
 
+/// The indirect command of a draw; instances are draws.
 pub fn command(info: &DrawInfo, draw: u32) -> DrawCommand {
     DrawCommand {
         index_count: info.index_count,
