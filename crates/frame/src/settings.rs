@@ -22,7 +22,7 @@ pub struct Settings {
     pub environment: Environment,
     /// What to show: [`views::FINAL`] or a debug view of the technique.
     pub view: String,
-    /// Keeps the linear radiance after a frame, for [`Prepared::hdr_rgba`]; its memory is then not reused.
+    /// Keeps the linear radiance after a frame, for `Prepared::hdr_rgba`; its memory is then not reused.
     pub keep_hdr: bool,
     /// Effects.
     pub effects: Effects,

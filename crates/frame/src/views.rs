@@ -35,7 +35,7 @@ pub const TEXTURE_ERROR: &str = "texture-error";
 pub const TRIANGLES: &[&str] =
     &[SAMPLE_USAGE, INVOCATIONS, EDGES, WEIGHTS, TRIANGLE_SHARING, ATTRIBUTE_ERROR, TEXTURE_ERROR];
 
-/// Whether a view is one of [`RecordSource`].
+/// Whether a view shows the triangle records that the samples of a pixel refer to.
 pub fn is_of_triangles(view: &str) -> bool {
     view == TRIANGLE_SHARING || compares_triangles(view)
 }

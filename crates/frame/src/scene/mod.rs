@@ -28,7 +28,7 @@ use crate::{
 };
 
 /// A scene uploaded once and shared by all techniques. Draws with alpha blending stand apart, after the others: techniques do not
-/// see them, [`afterlight_stages::compose::transparent`] draws them.
+/// see them, the stage for transparent surfaces draws them.
 pub struct SceneGpu {
     /// Positions of vertices, object space, 12 bytes each.
     pub positions: gpu::Buffer,

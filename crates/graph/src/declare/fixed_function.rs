@@ -49,7 +49,7 @@ impl StencilFace {
     }
 }
 
-/// Stencil test of a draw; the reference value is part of the [`Draw`].
+/// Stencil test of a draw; the reference value is part of the [`Draw`](crate::Draw).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct StencilTest {
     /// For front faces.

@@ -27,7 +27,7 @@ pub struct VertexAttribute {
 /// Vertex input of a pipeline; empty where the shader fetches its vertices itself.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 pub struct VertexLayout {
-    /// Vertex buffer bindings, in the order of [`Draw::vertex_buffers`].
+    /// Vertex buffer bindings, in the order of [`Draw::vertex_buffers`](crate::Draw::vertex_buffers).
     pub streams: Vec<VertexStream>,
     /// Attributes read from them.
     pub attributes: Vec<VertexAttribute>,

@@ -6,7 +6,7 @@ use crate::declare::ResourceKind;
 /// Where a transient resource lies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Placement {
-    /// Index into [`Plan::heaps`].
+    /// Index into [`Plan::heaps`](crate::Plan::heaps).
     pub heap: usize,
     /// Offset in the heap in bytes.
     pub offset: u64,

@@ -13,7 +13,7 @@ use afterlight_scene::Aabb;
 /// linear base colour. −1 where nothing is compared.
 pub const ATTRIBUTE_ERRORS: &str = "attribute errors";
 
-/// Name, after the technique's, of the buffer of counts that [`super::TRIANGLE_SHARING`] keeps: a 32-bit word a record, the
+/// Name, after the technique's, of the buffer of counts that [`afterlight_frame::views::TRIANGLE_SHARING`] keeps: a 32-bit word a record, the
 /// image's visibility samples that refer to it; zero beyond the last record.
 pub const RECORD_SAMPLES: &str = "record samples";
 
@@ -33,7 +33,7 @@ pub struct RecordSource<'a> {
 }
 
 impl RecordSource<'_> {
-    /// Declares the frame's view, one of those that [`super::is_of_triangles`] names. Returns its image.
+    /// Declares the frame's view, one of those that [`afterlight_frame::views::is_of_triangles`] names. Returns its image.
     ///
     /// # Errors
     /// A view of errors in a tessellated frame, whose triangles have no ID; a shader that is not compiled in.
@@ -44,7 +44,7 @@ impl RecordSource<'_> {
         }
     }
 
-    /// Declares [`super::TRIANGLE_SHARING`]: a count of samples a record, then colours.
+    /// Declares [`afterlight_frame::views::TRIANGLE_SHARING`]: a count of samples a record, then colours.
     ///
     /// # Errors
     /// A shader that is not compiled in.

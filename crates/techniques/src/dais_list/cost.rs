@@ -2,7 +2,7 @@
 
 use afterlight_cost::{Cost, Workload};
 
-/// The project's own: [`dais`] with a float a sample (depth), a float a pixel (the head) and two a surface where a pixel shows
+/// The project's own: [`dais`](crate::dais::cost::dais) with a float a sample (depth), a float a pixel (the head) and two a surface where a pixel shows
 /// several; the scene is drawn twice.
 pub fn dais_list(w: &Workload) -> Cost {
     let (stored, shaded) = (w.shading_samples, w.expected_samples);
