@@ -18,7 +18,7 @@ use afterlight_graph::{BufferHandle, BufferRole, Graph, ImageHandle, Load, PassR
 use afterlight_cost::{Cost, Workload};
 use afterlight_frame::{
     ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, OpaqueDepth, Params, Source, SourceSlots,
-    Technique, TechniqueError, views,
+    Technique, TechniqueError, TriangleIds, views,
 };
 use afterlight_shader::Shader;
 use afterlight_stages::{
@@ -185,8 +185,9 @@ pub(crate) fn record(
     };
     let source = source_of(frame, &tag);
     let radiance = shade(graph, frame, asked, (source, &visible.surfaces()), &triangles.records, &bind)?;
-    if let Visible::Ids { depth, .. } = visible {
+    if let Visible::Ids { ids, depth, .. } = visible {
         frame.board.put(OpaqueDepth(depth));
+        frame.board.put(TriangleIds(ids));
     }
     Ok(radiance)
 }

@@ -11,8 +11,8 @@ use afterlight_graph::{Graph, ImageHandle, Load, PassRole, gpu::vk};
 
 use afterlight_cost::{Cost, Workload};
 use afterlight_frame::{
-    Answers, AppendixA, Exactness, Frame, Info, OpaqueDepth, Params, Source, Technique, TechniqueError,
-    params::AutoOr,
+    Answers, AppendixA, Exactness, Frame, Info, OpaqueDepth, Params, Source, SurfaceNormals, Technique,
+    TechniqueError, params::AutoOr,
 };
 use afterlight_shader::Shader;
 use afterlight_stages::{
@@ -98,6 +98,7 @@ impl Technique for Deferred {
         volumes::draw_all(frame, &mut pass, "lights/volumes/light.frag", 1)?;
         pass.finish();
         frame.board.put(OpaqueDepth(filled.depth));
+        frame.board.put(SurfaceNormals(filled.normal));
         Ok(filled.accumulation)
     }
 }

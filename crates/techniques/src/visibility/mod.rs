@@ -12,7 +12,7 @@ use afterlight_graph::{BufferRole, Graph, ImageHandle, Load, PassRole, gpu::vk};
 use afterlight_cost::{Cost, Workload};
 use afterlight_frame::{
     Answers, AppendixA, Exactness, Frame, Info, OpaqueDepth, Params, Source, SourceSlots, Technique,
-    TechniqueError, set_constants,
+    TechniqueError, TriangleIds, set_constants,
 };
 use afterlight_shader::Shader;
 use afterlight_stages::{
@@ -99,6 +99,7 @@ impl Technique for Visibility {
             pass.read_image("ids", &ids);
         })?;
         frame.board.put(OpaqueDepth(depth));
+        frame.board.put(TriangleIds(ids));
         Ok(radiance)
     }
 }

@@ -13,7 +13,7 @@
 use afterlight_graph::{BufferRole, ComputePass, Graph, ImageHandle, Load, PassRole, RasterPass, gpu::vk};
 
 use crate::{lights::step::LightStep, surfaces::geometry::SceneDraws};
-use afterlight_frame::{Frame, OpaqueDepth, Slots, TechniqueError, set_constants};
+use afterlight_frame::{Frame, OpaqueDepth, Slots, SurfaceNormals, TechniqueError, set_constants};
 
 /// Handles of a filled G-buffer.
 pub struct GBuffer {
@@ -120,5 +120,6 @@ pub fn shade_by(
     pass.dispatch(frame.groups(8));
     pass.finish();
     frame.board.put(OpaqueDepth(filled.depth));
+    frame.board.put(SurfaceNormals(filled.normal));
     Ok(radiance)
 }
