@@ -4,6 +4,25 @@
 //! shaders use. [`Graph::plan`] turns it, without a device, into a [`Plan`]: passes in order, barriers, lifetimes, places
 //! in memory. The executor makes what a plan needs once and runs it any number of times, and reports time, statistics
 //! and bytes of everything.
+//!
+//! Every pass, buffer and image says what it is for where it is declared:
+//! ```
+//! use afterlight_graph::{BufferRole, Graph, PassRole};
+//! let mut graph = Graph::new();
+//! let lists = graph.buffer("lists", BufferRole::Lights, 64);
+//! let _lists = graph.clear_buffer("clear lists", PassRole::LightAssignment, lists, 0);
+//! ```
+//! One without a role does not compile:
+//! ```compile_fail,E0061
+//! # use afterlight_graph::{BufferRole, Graph, PassRole};
+//! # let mut graph = Graph::new();
+//! let lists = graph.buffer("lists", 64);
+//! ```
+//! ```compile_fail,E0061
+//! # use afterlight_graph::{BufferRole, Graph, PassRole};
+//! # let mut graph = Graph::new();
+//! graph.raster("geometry").finish();
+//! ```
 
 mod bind;
 mod declare;
