@@ -93,6 +93,18 @@ fn on_sponza() {
     all_agree(&stage, &stage.from(camera, (320, 180), 100), "sponza", 1);
 }
 
+/// An eye 0.6 mm above the ground: between a sample that the ground covers and the pixel's centre the ground ends, at the horizon, and
+/// what is interpolated at the centre lies behind the viewer.
+#[test]
+fn with_an_eye_on_the_ground() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:intersect");
+    let eye = Vec3::new(-0.800_865_8, 0.000_618_366_8, -2.290_116_5);
+    let target = Vec3::new(-4.533_236, -0.242_336_78, 2.401_406);
+    let camera = Camera::look_at("on the ground", eye, target, 84.190_74_f32.to_radians(), 0.000_3);
+    all_agree(&stage, &stage.from(camera, (96, 54), 9), "on the ground", 1);
+}
+
 /// One sample is not several: a comparison that cannot tell would prove nothing.
 #[test]
 fn one_sample_is_caught() {

@@ -4,6 +4,7 @@ layout(set = 0, binding = 9) uniform texture2DMS gbuffer_base_color;
 layout(set = 0, binding = 10) uniform texture2DMS gbuffer_normal;
 #define IDS_BINDING 11
 #include "surfaces/visible/triangles.glsl"
+#include "deferred_dedup/distance.glsl"
 layout(set = 0, binding = 12) uniform texture2DMS gbuffer_distance;
 #ifdef EMISSION
 layout(set = 0, binding = 16) uniform texture2DMS gbuffer_emission;
@@ -12,10 +13,6 @@ layout(set = 0, binding = 16) uniform texture2DMS gbuffer_emission;
 ivec2 source_pixel;
 uint source_mask;           // samples that need to be shaded
 uint source_background;     // samples without a surface
-
-float distance_from_word(uint distance_occlusion) {
-    return uintBitsToFloat((distance_occlusion & 0xffffffu) << 7);
-}
 
 void source_begin(ivec2 pixel) {
     source_pixel = pixel;
@@ -42,7 +39,7 @@ bool source_next(out Surface s, out uint weight) {
     vec4 base = texelFetch(gbuffer_base_color, source_pixel, int(first));
     uint normal_roughness = packUnorm4x8(texelFetch(gbuffer_normal, source_pixel, int(first)));
     uint distance_occlusion = packUnorm4x8(texelFetch(gbuffer_distance, source_pixel, int(first)));
-    float distance_m = distance_from_word(distance_occlusion);
+    float distance_m = distance_from_word(distance_occlusion & 0xffffffu);
     s.position_ws = position_from_depth(ndc_from_pixel(uvec2(source_pixel)), depth_from_distance(distance_m));
     vec2 oct = vec2(normal_roughness & 0xfffu, normal_roughness >> 12 & 0xfffu) / 4095.0;
     s.normal_ws = octahedral_decode(oct * 2.0 - 1.0);
