@@ -1,6 +1,7 @@
 //! The crate on whatever device the machine has, validation with synchronization checks on.
 
 use afterlight_gpu::*;
+use afterlight_testkit::{Need, skip};
 use std::path::Path;
 
 fn open() -> Device {
@@ -74,6 +75,7 @@ fn scale_pipeline(device: &Device, spirv: &[u32], factor: u32) -> Pipeline {
             slots: &[slot(2, STORAGE, COMPUTE)],
             long_lived: None,
             push_constant_bytes: 8,
+            subgroup: None,
         })
         .expect("a pipeline")
 }
@@ -210,7 +212,7 @@ fn timestamps_and_statistics_of_more_passes_than_a_pool_holds() {
     }
     let completed = device.submit(encoder).expect("done");
     if device.features().timestamp_valid_bits == 0 {
-        println!("skipped: times, the queue has no timestamps");
+        skip(Need::Timestamps, "the queue has none");
     } else {
         let sum: f64 =
             marks.iter().map(|(from, to, _)| completed.elapsed_ns(*from, *to).expect("timestamps")).sum();
@@ -223,7 +225,7 @@ fn timestamps_and_statistics_of_more_passes_than_a_pool_holds() {
             assert_eq!(statistics.compute_invocations, 640, "{statistics:?}");
         }
     } else {
-        println!("skipped: counts, the device has no pipeline statistics");
+        skip(Need::Statistics, "the device has none");
     }
     assert_clean(&device);
 }
@@ -542,7 +544,7 @@ fn what_the_device_cannot_hold_is_an_error_with_the_name() {
             if resource == "much too large" && *bytes > heap_bytes);
         assert!(named, "{error:?}");
     } else {
-        println!("skipped: no buffer of this device is larger than its memory");
+        skip(Need::ReachableLimit, "no buffer of this device is larger than its memory");
     }
     let error =
         device.create_heap("vast heap", heap_bytes + 1, u32::MAX).err().expect("larger than the memory");
@@ -576,6 +578,7 @@ fn what_the_device_cannot_hold_is_an_error_with_the_name() {
             slots: &[],
             long_lived: None,
             push_constant_bytes: 0,
+            subgroup: None,
         })
         .expect_err("no SPIR-V");
     assert!(matches!(&error, GpuError::Shader { name, .. } if name == "test/none.comp"), "{error:?}");

@@ -19,6 +19,14 @@ impl Requirements for Device {
     fn buffer(&self, name: &str, bytes: u64, usage: vk::BufferUsageFlags) -> Result<MemoryNeed, GpuError> {
         self.buffer_requirements(&buffer_desc(name, bytes, usage)).map(need)
     }
+
+    fn most_allocation_bytes(&self) -> u64 {
+        self.features().max_allocation_bytes
+    }
+
+    fn most_groups(&self) -> [u32; 3] {
+        self.features().max_workgroup_count
+    }
 }
 
 pub(super) fn need(from: gpu::MemoryRequirements) -> MemoryNeed {
