@@ -225,8 +225,40 @@ impl Frame<'_> {
         [r, g, b, 1.0]
     }
 
+    /// Groups for `count` pieces of work, in as few rows as the device's limit on groups along an axis allows. A group's piece is
+    /// `gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x`; the last row may have a few groups too many.
+    pub fn groups_in_rows(&self, count: u32) -> [u32; 3] {
+        in_rows(count, self.features().max_workgroup_count[0])
+    }
+
     /// Groups of `size`×`size` threads that cover the image.
     pub fn groups(&self, size: u32) -> [u32; 3] {
         [self.width_px.div_ceil(size), self.height_px.div_ceil(size), 1]
+    }
+}
+
+/// `count` groups in rows of one length of at most `most` groups.
+fn in_rows(count: u32, most: u32) -> [u32; 3] {
+    let rows = count.div_ceil(most).max(1);
+    [count.div_ceil(rows), rows, 1]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_hold_every_group_and_are_no_longer_than_the_limit() {
+        const MOST: u32 = 65_535;
+        assert_eq!(in_rows(0, MOST), [0, 1, 1]);
+        assert_eq!(in_rows(1, MOST), [1, 1, 1]);
+        assert_eq!(in_rows(MOST, MOST), [MOST, 1, 1], "what fits is one row");
+        assert_eq!(in_rows(MOST + 1, MOST), [32_768, 2, 1]);
+        for count in [MOST + 1, 2 * MOST, 2 * MOST + 1, 16 << 20, u32::MAX] {
+            let [across, rows, _] = in_rows(count, MOST);
+            let groups = u64::from(across) * u64::from(rows);
+            assert!(across <= MOST && groups >= u64::from(count), "{count}: {across} by {rows}");
+            assert!(groups - u64::from(count) < u64::from(rows), "{count}: {across} by {rows} is too many");
+        }
     }
 }
