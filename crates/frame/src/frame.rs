@@ -152,12 +152,7 @@ impl Frame<'_> {
     /// # Errors
     /// [`TechniqueError::TooLarge`], which names `what`, the bytes and the device's limit.
     pub fn check_binding(&self, technique: &str, what: &str, bytes: u64) -> Result<(), TechniqueError> {
-        let limit = self.features().max_storage_buffer_range;
-        if bytes > limit {
-            let what = format!("{technique}: bytes of {what}");
-            return Err(TechniqueError::TooLarge { what, found: bytes, limit });
-        }
-        Ok(())
+        check_range(technique, what, bytes, self.features().max_storage_buffer_range)
     }
 
     /// Whether the device is a CPU.
@@ -237,6 +232,15 @@ impl Frame<'_> {
     }
 }
 
+/// Checks that one binding of a device that reaches `limit` bytes holds a buffer.
+fn check_range(technique: &str, what: &str, bytes: u64, limit: u64) -> Result<(), TechniqueError> {
+    if bytes > limit {
+        let what = format!("{technique}: bytes of {what}");
+        return Err(TechniqueError::TooLarge { what, found: bytes, limit });
+    }
+    Ok(())
+}
+
 /// `count` groups in rows of one length of at most `most` groups.
 fn in_rows(count: u32, most: u32) -> [u32; 3] {
     let rows = count.div_ceil(most).max(1);
@@ -246,6 +250,14 @@ fn in_rows(count: u32, most: u32) -> [u32; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_binding_holds_as_many_bytes_as_the_device_reaches() {
+        let limit = 1 << 27;
+        assert!(check_range("t", "a list", limit, limit).is_ok());
+        let error = check_range("t", "a list", limit + 1, limit).expect_err("one byte more").to_string();
+        assert_eq!(error, "t: bytes of a list: found 134217729, expected at most 134217728");
+    }
 
     #[test]
     fn rows_hold_every_group_and_are_no_longer_than_the_limit() {

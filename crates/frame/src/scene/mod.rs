@@ -4,6 +4,8 @@ pub mod blended;
 pub mod draw_list;
 pub mod draws;
 pub mod lights;
+#[cfg(test)]
+mod limit_tests;
 mod materials;
 mod pieces;
 mod textures;
