@@ -25,6 +25,8 @@ pub enum Need {
     Timestamps,
     /// Pipeline statistics.
     Statistics,
+    /// A binding of more than 128 MiB.
+    LargeBindings,
     /// A limit that a test can reach with the memory there is.
     ReachableLimit,
 }
@@ -41,6 +43,7 @@ impl Need {
             Self::SubgroupSizes => "subgroup-sizes",
             Self::Timestamps => "timestamps",
             Self::Statistics => "statistics",
+            Self::LargeBindings => "large-bindings",
             Self::ReachableLimit => "reachable-limit",
         }
     }

@@ -6,7 +6,10 @@ use std::path::{Path, PathBuf};
 use afterlight_scene::{LoadOptions, Scene, SceneError, load_bytes};
 use serde_json::{Value, json};
 
-pub use afterlight_testkit::shared_scenes as scenes_dir;
+/// The folder of reference scenes, or `None`, told and counted.
+pub fn scenes_dir() -> Option<PathBuf> {
+    afterlight_testkit::shared_scenes()
+}
 
 /// All files below a folder with one of the extensions, sorted.
 pub fn files_under(dir: &Path, extensions: &[&str]) -> Vec<PathBuf> {
