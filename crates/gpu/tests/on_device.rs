@@ -172,6 +172,52 @@ fn compute_writes_what_constants_and_push_constants_say() {
     assert_clean(&device);
 }
 
+/// Writes the size of each thread's subgroup, and how many of its threads are there.
+const SUBGROUPS: &str = "#version 460
+#extension GL_KHR_shader_subgroup_ballot : require
+layout(local_size_x = 128) in;
+layout(set = 0, binding = 2) buffer Words { uint words[]; };
+void main() {
+    words[2 * gl_LocalInvocationIndex] = gl_SubgroupSize;
+    words[2 * gl_LocalInvocationIndex + 1] = subgroupBallotBitCount(subgroupBallot(true));
+}";
+
+/// A pipeline runs in full subgroups of every size that the device offers; other sizes are refused.
+#[test]
+fn a_pipeline_requires_the_size_of_its_subgroups() {
+    let device = open();
+    let spirv = compile(glslang::ShaderStage::Compute, SUBGROUPS);
+    let out = storage(&device, "sizes", 8 * 128, MemoryKind::Readback);
+    let pipeline = |invocations| {
+        device.compute_pipeline(&ComputePipelineDesc {
+            shader: ShaderCode { name: "test/subgroups.comp", spirv: &spirv, constants: &[] },
+            slots: &[slot(2, STORAGE, COMPUTE)],
+            long_lived: None,
+            push_constant_bytes: 0,
+            subgroup: Some(RequiredSubgroup { invocations, is_full: true }),
+        })
+    };
+    for size in [1, 2, 4, 8, 16, 32, 64, 128] {
+        if !device.features().offers_subgroup_size(size) {
+            let error = pipeline(size).expect_err("a size that the device does not offer");
+            assert!(
+                error.to_string().contains(&format!("subgroups of {size}, which test/subgroups.comp")),
+                "{error}"
+            );
+            continue;
+        }
+        let mut encoder = device.encoder().expect("an encoder");
+        encoder.bind_pipeline(&pipeline(size).expect("a pipeline"));
+        encoder.push_descriptors(&device.push_set(&[whole(2, &out)]).expect("a push set"));
+        encoder.dispatch([1, 1, 1]);
+        device.submit(encoder).expect("done");
+        let mut bytes = vec![0; 8 * 128];
+        out.read(0, &mut bytes).expect("read");
+        assert!(words(&bytes).iter().all(|word| *word == size), "{size}: {:?}", words(&bytes));
+    }
+    assert_clean(&device);
+}
+
 #[test]
 fn a_dropped_resource_lives_until_its_commands_are_done() {
     let device = open();

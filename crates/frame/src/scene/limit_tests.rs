@@ -73,11 +73,14 @@ fn textured(textures: &[(u32, u32, Sampler)]) -> Scene {
     }
 }
 
+/// Layers of an image of the device that textures are planned for.
+const LAYERS: usize = 13;
+
 /// The plan of textures on a device of small images and few layers: buckets of colours, warnings; or the error.
 fn planned(textures: &[(u32, u32, Sampler)]) -> Result<(u32, Vec<String>), String> {
     let mut features = Features::default();
     features.max_image_dimension_2d = 64;
-    features.max_array_layers = 4;
+    features.max_array_layers = LAYERS as u32;
     let mut warnings = Vec::new();
     let table = TextureTable::plan(&textured(textures), &features, &mut warnings);
     Ok((table.map_err(|error| error.to_string())?.bucket_counts()[0], warnings))
@@ -90,9 +93,9 @@ fn textures_are_as_large_and_as_many_as_the_device_takes() {
     let error = planned(&[(65, 1, plain)]).expect_err("too wide");
     assert!(error.contains("65 by 1") && error.contains("found 65") && error.contains("64"), "{error}");
     // Layers of one size.
-    assert_eq!(planned(&[(8, 8, plain); 4]), Ok((1, vec![])));
-    let error = planned(&[(8, 8, plain); 5]).expect_err("too many layers");
-    assert!(error.contains("8×8") && error.contains("found 5"), "{error}");
+    assert_eq!(planned(&[(8, 8, plain); LAYERS]), Ok((1, vec![])));
+    let error = planned(&[(8, 8, plain); LAYERS + 1]).expect_err("too many layers");
+    assert!(error.contains("8×8") && error.contains("found 14"), "{error}");
 }
 
 /// Twelve sizes and samplers of colours stay as they are; one more is resampled, which is told.
