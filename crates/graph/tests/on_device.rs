@@ -148,6 +148,30 @@ fn a_chain_in_several_allocations_gives_the_right_pixels() {
     assert_clean(&device);
 }
 
+/// Each heap is an allocation that the device allows, all of them are more than it has: told before any is made.
+#[test]
+fn a_frame_larger_than_the_memory_is_told() {
+    let Some(device) = open() else { return };
+    let (most, there) = (device.features().max_allocation_bytes, device.features().device_local_heap_bytes);
+    let bytes = most.min(device.features().max_buffer_bytes.saturating_sub(1 << 20)) / 2;
+    let mut g = Graph::new();
+    for index in 0..there / bytes + 1 {
+        let buffer = g.buffer(&format!("b{index}"), BufferRole::Counters, bytes);
+        let buffer = g.clear_buffer(&format!("clear {index}"), PassRole::Upkeep, buffer, 0);
+        g.keep(&buffer);
+    }
+    let plan = g.plan(&device).expect("a valid frame");
+    assert!(plan.heaps.len() > 1 && plan.heaps.iter().all(|heap| heap.bytes <= most), "{:?}", plan.heaps);
+    match Executor::new(&device, plan) {
+        Err(GraphError::Gpu(GpuError::OutOfMemory { resource, bytes })) => {
+            assert!(resource.contains("b0") && bytes > there, "{resource}: {bytes}");
+        }
+        Err(error) => panic!("{error}"),
+        Ok(_) => panic!("a frame of more than {there} bytes"),
+    }
+    assert_clean(&device);
+}
+
 #[test]
 fn a_chain_with_shared_memory_gives_the_right_pixels() {
     let Some(device) = open() else { return };

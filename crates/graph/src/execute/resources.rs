@@ -57,7 +57,21 @@ pub(super) enum Physical {
     Unused,
 }
 
+/// Refuses a frame that is larger than the device's memory before a driver is asked: each of its heaps may fit, and some drivers promise
+/// more than there is.
+fn check_memory(device: &Device, plan: &Plan) -> Result<(), GraphError> {
+    let bytes = plan.peak_bytes();
+    if bytes > device.features().device_local_heap_bytes {
+        let largest = plan.resources.iter().max_by_key(|resource| resource.need.bytes);
+        let largest = largest.map_or("", |resource| resource.name.as_str());
+        let resource = format!("the frame, {largest} and others");
+        return Err(GpuError::OutOfMemory { resource, bytes }.into());
+    }
+    Ok(())
+}
+
 pub(super) fn make_resources(device: &Device, plan: &Plan) -> Result<Vec<Physical>, GraphError> {
+    check_memory(device, plan)?;
     let heaps: Vec<gpu::Heap> = plan
         .heaps
         .iter()

@@ -31,10 +31,10 @@ void main() {
     uint weight;
     shaded_count = 0u;
     weight_sum = 0u;
+#ifdef LOW_RATE_QUADS
     if (inside) {
         source_begin(pixel);
     }
-#ifdef LOW_RATE_QUADS
     // Threads of a quad ask each other: every thread of the subgroup stays until the last has no surface left.
     bool found = inside;
     do {
@@ -45,8 +45,11 @@ void main() {
         }
     } while (subgroupAny(found));
 #else
-    while (inside && source_next(s, weight)) {
-        add_surface(s, weight, pixel, radiance);
+    if (inside) {
+        source_begin(pixel);
+        while (source_next(s, weight)) {
+            add_surface(s, weight, pixel, radiance);
+        }
     }
 #endif
     if (inside) {
