@@ -1,7 +1,7 @@
 //! The program as a user meets it: output, exit codes, one line for each bad input.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Output};
 
 use afterlight_testkit::{Need, shared_scenes, skip};
