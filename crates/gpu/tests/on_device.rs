@@ -576,24 +576,30 @@ fn validation_catches_a_missing_barrier() {
 #[test]
 fn what_the_device_cannot_hold_is_an_error_with_the_name() {
     let device = open();
-    let heap_bytes = device.features().device_local_heap_bytes;
-    if heap_bytes < device.features().max_buffer_bytes - 4096 {
+    let most_bytes = device.features().max_allocation_bytes;
+    if most_bytes < device.features().max_buffer_bytes - 4096 {
         let error = device
             .create_buffer(&BufferDesc {
                 name: "much too large",
-                bytes: heap_bytes + 1,
+                bytes: most_bytes + 1,
                 usage: vk::BufferUsageFlags::STORAGE_BUFFER,
                 memory: MemoryKind::DeviceLocal,
             })
-            .expect_err("larger than the memory");
-        let named = matches!(&error, GpuError::OutOfMemory { resource, bytes }
-            if resource == "much too large" && *bytes > heap_bytes);
+            .expect_err("larger than an allocation");
+        // What there is too little memory for is told before what no allocation holds.
+        let named = match &error {
+            GpuError::TooLarge { resource, found, .. } => resource == "much too large" && *found > most_bytes,
+            GpuError::OutOfMemory { resource, bytes } => resource == "much too large" && *bytes > most_bytes,
+            _ => false,
+        };
         assert!(named, "{error:?}");
     } else {
-        skip(Need::ReachableLimit, "no buffer of this device is larger than its memory");
+        skip(Need::ReachableLimit, "no buffer of this device is larger than an allocation");
     }
-    let error =
-        device.create_heap("vast heap", heap_bytes + 1, u32::MAX).err().expect("larger than the memory");
+    let error = device
+        .create_heap("vast heap", 2 * device.allocatable_bytes(), u32::MAX)
+        .err()
+        .expect("larger than the memory");
     assert!(matches!(&error, GpuError::OutOfMemory { resource, .. } if resource == "vast heap"), "{error:?}");
 
     let image = |width, samples, format| {

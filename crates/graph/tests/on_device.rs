@@ -7,7 +7,7 @@ use afterlight_gpu::{
 };
 use afterlight_graph::{
     Blend, BufferRole, DepthTest, Draw, DrawCall, Executor, Graph, GraphError, ImageHandle, ImageInfo, Load,
-    MemoryNeed, PassRole, RasterState, Requirements, StencilFace, StencilTest, Subresource,
+    MemoryNeed, PassRole, Plan, RasterState, Requirements, StencilFace, StencilTest, Subresource,
 };
 use afterlight_shader::Shader;
 use afterlight_shader::compile::Compiler;
@@ -148,23 +148,44 @@ fn a_chain_in_several_allocations_gives_the_right_pixels() {
     assert_clean(&device);
 }
 
+/// A frame of so many buffers that live at once, half of an allocation each.
+fn large_frame(device: &Device, buffers: u64) -> Plan {
+    let mut g = Graph::new();
+    for index in 0..buffers {
+        let buffer = g.buffer(&format!("b{index}"), BufferRole::Counters, half_allocation(device));
+        let buffer = g.clear_buffer(&format!("clear {index}"), PassRole::Upkeep, buffer, 0);
+        g.keep(&buffer);
+    }
+    let plan = g.plan(device).expect("a valid frame");
+    let most = device.features().max_allocation_bytes;
+    assert!(plan.heaps.len() > 1 && plan.heaps.iter().all(|heap| heap.bytes <= most), "{:?}", plan.heaps);
+    plan
+}
+
+fn half_allocation(device: &Device) -> u64 {
+    device.features().max_allocation_bytes.min(device.features().max_buffer_bytes.saturating_sub(1 << 20)) / 2
+}
+
+/// One and a half allocations: on lavapipe (Mesa 22.3) more than the heap that it tells of as well. Nothing runs, so that no page is touched.
+#[test]
+fn a_frame_larger_than_one_allocation_is_allocated() {
+    let Some(device) = open() else { return };
+    if device.allocatable_bytes() < 4 * half_allocation(&device) {
+        return skip(Need::ReachableLimit, "the host has too little memory left for two allocations");
+    }
+    Executor::new(&device, large_frame(&device, 3)).expect("two allocations");
+    assert_clean(&device);
+}
+
 /// Each heap is an allocation that the device allows, all of them are more than it has: told before any is made.
 #[test]
 fn a_frame_larger_than_the_memory_is_told() {
     let Some(device) = open() else { return };
-    let (most, there) = (device.features().max_allocation_bytes, device.features().device_local_heap_bytes);
-    let bytes = most.min(device.features().max_buffer_bytes.saturating_sub(1 << 20)) / 2;
-    let mut g = Graph::new();
-    for index in 0..there / bytes + 1 {
-        let buffer = g.buffer(&format!("b{index}"), BufferRole::Counters, bytes);
-        let buffer = g.clear_buffer(&format!("clear {index}"), PassRole::Upkeep, buffer, 0);
-        g.keep(&buffer);
-    }
-    let plan = g.plan(&device).expect("a valid frame");
-    assert!(plan.heaps.len() > 1 && plan.heaps.iter().all(|heap| heap.bytes <= most), "{:?}", plan.heaps);
-    match Executor::new(&device, plan) {
+    // What a host has left may grow meanwhile.
+    let there = 2 * device.allocatable_bytes();
+    match Executor::new(&device, large_frame(&device, there / half_allocation(&device) + 1)) {
         Err(GraphError::Gpu(GpuError::OutOfMemory { resource, bytes })) => {
-            assert!(resource.contains("b0") && bytes > there, "{resource}: {bytes}");
+            assert!(resource.contains("the frame") && bytes > there, "{resource}: {bytes}");
         }
         Err(error) => panic!("{error}"),
         Ok(_) => panic!("a frame of more than {there} bytes"),

@@ -61,7 +61,7 @@ pub(super) enum Physical {
 /// more than there is.
 fn check_memory(device: &Device, plan: &Plan) -> Result<(), GraphError> {
     let bytes = plan.peak_bytes();
-    if bytes > device.features().device_local_heap_bytes {
+    if bytes > device.allocatable_bytes() {
         let largest = plan.resources.iter().max_by_key(|resource| resource.need.bytes);
         let largest = largest.map_or("", |resource| resource.name.as_str());
         let resource = format!("the frame, {largest} and others");
