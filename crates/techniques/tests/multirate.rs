@@ -135,8 +135,8 @@ fn quads_in_subgroups(stage: &Stage, settings: &Settings, shaders: &[Shader], si
     radiance_of(&mut prepared.unwrap_or_else(|e| panic!("{e}")))
 }
 
-/// Quads share the same samples whatever the size of subgroups. The mutants: the number that a thread was taken for, on a driver that varies the size up
-/// to 32; and quads that nobody finds, where every pixel gathers for itself.
+/// Quads share the same samples whatever the size of subgroups. The mutants: the number that a thread was taken for, on a driver that
+/// varies the size up to 32; and quads that nobody finds, where every pixel gathers for itself.
 #[test]
 fn quads_do_not_depend_on_the_size_of_subgroups() {
     let gpu = afterlight_testkit::gpu();
