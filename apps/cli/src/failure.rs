@@ -98,6 +98,7 @@ impl From<GraphError> for Failure {
     fn from(error: GraphError) -> Failure {
         match error {
             GraphError::Gpu(error) => error.into(),
+            GraphError::Groups { .. } => Failure::Input(error.to_string()),
             other => Failure::Failed(other.to_string()),
         }
     }

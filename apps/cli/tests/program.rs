@@ -1,9 +1,10 @@
 //! The program as a user meets it: output, exit codes, one line for each bad input.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Output};
 
+use afterlight_testkit::{Need, shared_scenes, skip};
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -55,7 +56,7 @@ fn refused(arguments: &[&str], code: i32, parts: &[&str]) -> String {
 fn has_device() -> bool {
     let there = run(&["devices"]).status.success();
     if !there {
-        eprintln!("skipped: no Vulkan device on this machine");
+        skip(Need::Device, "`afterlight devices` finds none");
     }
     there
 }
@@ -411,8 +412,7 @@ fn samples_that_the_device_lacks_are_told() {
         .into_iter()
         .find(|count| !there.contains(&count.parse::<u64>().expect("a number").into()))
     else {
-        eprintln!("skipped: the device has every number of samples");
-        return;
+        return skip(Need::ReachableLimit, "the device has every number of samples");
     };
     refused(
         &["compare", "builtin:edge", "--device", "0", "--samples", lacking],
@@ -757,19 +757,9 @@ fn bench_dais_fig7_counts_the_triangles_of_a_tessellation() {
     }
 }
 
-/// The folder of reference scenes, beside the repository.
-fn reference_scenes() -> Option<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/scenes");
-    if !folder.is_dir() {
-        eprintln!("skipped: no reference scenes in {}", folder.display());
-        return None;
-    }
-    Some(folder)
-}
-
 #[test]
 fn every_invalid_sample_is_told_or_loads() {
-    let Some(scenes) = reference_scenes() else { return };
+    let Some(scenes) = shared_scenes() else { return };
     let mut stack = vec![scenes.join("samples/invalid")];
     let mut files = Vec::new();
     while let Some(folder) = stack.pop() {

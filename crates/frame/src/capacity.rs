@@ -30,7 +30,7 @@ const UNSTEADY_FRAMES: u32 = 4;
 pub struct Counter {
     /// What is counted: `blocks`.
     pub name: String,
-    /// Elements that the frame asked for.
+    /// Elements that the frame asked for; `u32::MAX` where their sum passed 2³² on the device.
     pub needed: u32,
     /// Elements that there was room for.
     pub capacity: u32,
@@ -66,13 +66,20 @@ impl Demand {
         let word = |i: usize| {
             bytes.get(4 * i..4 * i + 4).map_or(0, |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]))
         };
-        Ok(Counter {
+        Ok(self.counted(word(0), word(1)))
+    }
+
+    /// The counter of two words from the device. What fits drops nothing: where something was dropped and the sum is still within the
+    /// capacity, it has passed 2³² and begun anew.
+    fn counted(&self, needed: u32, dropped: u32) -> Counter {
+        let has_wrapped = dropped > 0 && needed <= self.capacity;
+        Counter {
             name: self.name.to_owned(),
-            needed: word(0),
+            needed: if has_wrapped { u32::MAX } else { needed },
             capacity: self.capacity,
-            dropped: word(1),
+            dropped,
             fixed: self.fixed,
-        })
+        }
     }
 }
 
@@ -199,6 +206,30 @@ mod tests {
                 );
             }
         }
+    }
+
+    /// A sum that has passed 2³² looks small, and would be taken for a list that fits.
+    #[test]
+    fn a_sum_that_has_begun_anew_is_no_list_that_fits() {
+        let demand = |capacity, fixed| Demand {
+            name: "blocks",
+            resource: kept(),
+            capacity,
+            fixed,
+            slack_eighths: STEADY,
+        };
+        let counted = demand(100, false).counted(90, 5);
+        assert_eq!((counted.needed, counted.dropped), (u32::MAX, 5));
+        let next = Capacities::default().next(&[counted]).expect("no room for all");
+        assert_eq!(
+            next.known[0].1,
+            u32::MAX,
+            "room that no device binds is asked for, and refused with its bytes"
+        );
+        assert_eq!(demand(100, true).counted(100, 1).needed, u32::MAX, "a fixed bound tells it as well");
+        // The edge: what fits to the last element, and what is one more.
+        assert_eq!(demand(100, false).counted(100, 0).needed, 100);
+        assert_eq!(demand(100, false).counted(101, 1).needed, 101);
     }
 
     #[test]

@@ -152,12 +152,7 @@ impl Frame<'_> {
     /// # Errors
     /// [`TechniqueError::TooLarge`], which names `what`, the bytes and the device's limit.
     pub fn check_binding(&self, technique: &str, what: &str, bytes: u64) -> Result<(), TechniqueError> {
-        let limit = self.features().max_storage_buffer_range;
-        if bytes > limit {
-            let what = format!("{technique}: bytes of {what}");
-            return Err(TechniqueError::TooLarge { what, found: bytes, limit });
-        }
-        Ok(())
+        check_range(technique, what, bytes, self.features().max_storage_buffer_range)
     }
 
     /// Whether the device is a CPU.
@@ -225,8 +220,57 @@ impl Frame<'_> {
         [r, g, b, 1.0]
     }
 
+    /// Groups for `count` pieces of work, in as few rows as the device's limit on groups along an axis allows. A group's piece is
+    /// `gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x`; the last row may have a few groups too many.
+    pub fn groups_in_rows(&self, count: u32) -> [u32; 3] {
+        in_rows(count, self.features().max_workgroup_count[0])
+    }
+
     /// Groups of `size`×`size` threads that cover the image.
     pub fn groups(&self, size: u32) -> [u32; 3] {
         [self.width_px.div_ceil(size), self.height_px.div_ceil(size), 1]
+    }
+}
+
+/// Checks that one binding of a device that reaches `limit` bytes holds a buffer.
+fn check_range(technique: &str, what: &str, bytes: u64, limit: u64) -> Result<(), TechniqueError> {
+    if bytes > limit {
+        let what = format!("{technique}: bytes of {what}");
+        return Err(TechniqueError::TooLarge { what, found: bytes, limit });
+    }
+    Ok(())
+}
+
+/// `count` groups in rows of one length of at most `most` groups.
+fn in_rows(count: u32, most: u32) -> [u32; 3] {
+    let rows = count.div_ceil(most).max(1);
+    [count.div_ceil(rows), rows, 1]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_binding_holds_as_many_bytes_as_the_device_reaches() {
+        let limit = 1 << 27;
+        assert!(check_range("t", "a list", limit, limit).is_ok());
+        let error = check_range("t", "a list", limit + 1, limit).expect_err("one byte more").to_string();
+        assert_eq!(error, "t: bytes of a list: found 134217729, expected at most 134217728");
+    }
+
+    #[test]
+    fn rows_hold_every_group_and_are_no_longer_than_the_limit() {
+        const MOST: u32 = 65_535;
+        assert_eq!(in_rows(0, MOST), [0, 1, 1]);
+        assert_eq!(in_rows(1, MOST), [1, 1, 1]);
+        assert_eq!(in_rows(MOST, MOST), [MOST, 1, 1], "what fits is one row");
+        assert_eq!(in_rows(MOST + 1, MOST), [32_768, 2, 1]);
+        for count in [MOST + 1, 2 * MOST, 2 * MOST + 1, 16 << 20, u32::MAX] {
+            let [across, rows, _] = in_rows(count, MOST);
+            let groups = u64::from(across) * u64::from(rows);
+            assert!(across <= MOST && groups >= u64::from(count), "{count}: {across} by {rows}");
+            assert!(groups - u64::from(count) < u64::from(rows), "{count}: {across} by {rows} is too many");
+        }
     }
 }

@@ -40,7 +40,7 @@ pub fn record_image<T: bytemuck::NoUninit>(
 ) -> Result<gpu::Image, gpu::GpuError> {
     let stride_bytes = 16 * stride_texels;
     assert!(size_of::<T>() <= stride_bytes, "{name}: {} bytes in {stride_bytes}", size_of::<T>());
-    let rows = (records.len() * stride_texels).div_ceil(ROW_TEXELS).max(1);
+    let rows = record_rows(records.len(), stride_texels);
     let mut bytes = vec![0u8; rows * ROW_TEXELS * 16];
     for (place, record) in bytes.chunks_exact_mut(stride_bytes).zip(records) {
         place[..size_of::<T>()].copy_from_slice(bytemuck::bytes_of(record));
@@ -57,4 +57,22 @@ pub fn record_image<T: bytemuck::NoUninit>(
     })?;
     uploader.image(&image, 0, 0, &bytes)?;
     Ok(image)
+}
+
+/// Rows of an image of so many records; the device refuses more than it takes, by the image's name.
+fn record_rows(records: usize, stride_texels: usize) -> usize {
+    (records * stride_texels).div_ceil(ROW_TEXELS).max(1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What an image of 16,384 rows holds: lights and draws of four texels, materials of eight.
+    #[test]
+    fn records_of_an_image_of_16384_rows() {
+        assert_eq!(record_rows(0, 4), 1);
+        assert_eq!([4_194_304, 4_194_305].map(|lights| record_rows(lights, 4)), [16_384, 16_385]);
+        assert_eq!([2_097_152, 2_097_153].map(|materials| record_rows(materials, 8)), [16_384, 16_385]);
+    }
 }

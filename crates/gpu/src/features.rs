@@ -75,7 +75,7 @@ features! {
     subgroup_operations: vk::SubgroupFeatureFlags,
     /// In which stages subgroup operations are.
     subgroup_stages: vk::ShaderStageFlags,
-    /// Subgroup size can be required by a pipeline.
+    /// A compute pipeline can require a subgroup size, and that subgroups are full.
     subgroup_size_control: bool,
     /// Pipeline-statistics queries.
     pipeline_statistics: bool,
@@ -219,6 +219,18 @@ impl Features {
         let color = if integer { self.sample_counts_integer } else { self.sample_counts_color };
         samples.is_power_of_two() && color & self.sample_counts_depth & samples != 0
     }
+
+    /// Whether a compute pipeline can require subgroups of that many invocations.
+    pub fn offers_subgroup_size(&self, invocations: u32) -> bool {
+        self.subgroup_size_control
+            && invocations.is_power_of_two()
+            && (self.min_subgroup_size..=self.max_subgroup_size).contains(&invocations)
+    }
+
+    /// Sizes of subgroups that a compute pipeline can require, ascending.
+    pub fn subgroup_sizes(&self) -> Vec<u32> {
+        (0..=7).map(|log2| 1 << log2).filter(|size| self.offers_subgroup_size(*size)).collect()
+    }
 }
 
 /// The features to enable, kept together since they are chained by pointers.
@@ -310,6 +322,14 @@ pub(crate) fn detect(instance: &ash::Instance, physical: vk::PhysicalDevice, ind
         core = features.features;
     }
 
+    let operations = vk::SubgroupFeatureFlags::ARITHMETIC | vk::SubgroupFeatureFlags::BALLOT;
+    if is_13
+        && !(p11.subgroup_supported_operations.contains(operations)
+            && p11.subgroup_supported_stages.contains(vk::ShaderStageFlags::COMPUTE))
+    {
+        missing.push("subgroup arithmetic and ballots in compute shaders");
+    }
+
     // SAFETY: `physical` belongs to `instance`.
     let families = unsafe { instance.get_physical_device_queue_family_properties(physical) };
     let wanted = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;
@@ -378,7 +398,9 @@ pub(crate) fn detect(instance: &ash::Instance, physical: vk::PhysicalDevice, ind
         max_subgroup_size: p13.max_subgroup_size,
         subgroup_operations: p11.subgroup_supported_operations,
         subgroup_stages: p11.subgroup_supported_stages,
-        subgroup_size_control: on(enable.v13.subgroup_size_control),
+        subgroup_size_control: on(enable.v13.subgroup_size_control)
+            && on(enable.v13.compute_full_subgroups)
+            && p13.required_subgroup_size_stages.contains(vk::ShaderStageFlags::COMPUTE),
         pipeline_statistics: on(enable.core.pipeline_statistics_query),
         timestamp_period_ns: limits.timestamp_period,
         timestamp_valid_bits,
@@ -568,5 +590,14 @@ mod tests {
         assert!(!features.supports_samples(2, false));
         assert!(!features.supports_samples(3, false));
         assert!(!features.supports_samples(0, false));
+    }
+
+    #[test]
+    fn subgroup_sizes_are_powers_of_two_between_the_ends() {
+        let mut features = Features { min_subgroup_size: 8, max_subgroup_size: 32, ..Features::default() };
+        assert!(features.subgroup_sizes().is_empty(), "no size can be required");
+        features.subgroup_size_control = true;
+        assert_eq!(features.subgroup_sizes(), [8, 16, 32]);
+        assert!(!features.offers_subgroup_size(24) && !features.offers_subgroup_size(0));
     }
 }

@@ -44,8 +44,8 @@ pub use format::{FormatInfo, format_info};
 pub use image::{Image, ImageDesc, ImageView, ViewDesc, ViewKind};
 pub use memory::{Buffer, BufferDesc, Heap, MemoryKind, MemoryRequirements};
 pub use pipeline::{
-    BlendEquation, BlendState, ComputePipelineDesc, DepthState, Pipeline, RasterPipelineDesc, ShaderCode,
-    StencilFace, StencilState, VertexAttribute, VertexBinding,
+    BlendEquation, BlendState, ComputePipelineDesc, DepthState, Pipeline, RasterPipelineDesc,
+    RequiredSubgroup, ShaderCode, StencilFace, StencilState, VertexAttribute, VertexBinding,
 };
 pub use sampler::{Sampler, SamplerDesc};
 pub use upload::{UPLOAD_RING_BYTES, Uploader};

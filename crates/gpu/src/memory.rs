@@ -425,11 +425,21 @@ impl Device {
         })
     }
 
+    /// Most bytes of device-local memory that all allocations together may take: the largest heap. The memory of a CPU device is the
+    /// host's, of which its heap may say nothing (2 GiB always, lavapipe of Mesa 22.3): there it is what the host has left, where that is more.
+    pub fn allocatable_bytes(&self) -> u64 {
+        let heap = self.features().device_local_heap_bytes;
+        match self.info().kind {
+            "cpu" => heap.max(host_memory_left_bytes().unwrap_or(0)),
+            _ => heap,
+        }
+    }
+
     /// Refuses what cannot fit before a driver is asked: some overcommit and fail at the first touch.
     fn check_allocation(&self, name: &str, bytes: u64, kind: MemoryKind) -> Result<(), GpuError> {
         let features = self.features();
         let room = match kind {
-            MemoryKind::DeviceLocal => features.device_local_heap_bytes,
+            MemoryKind::DeviceLocal => self.allocatable_bytes(),
             MemoryKind::Upload | MemoryKind::Readback => {
                 self.0.memory.memory_heaps_as_slice().iter().map(|h| h.size).max().unwrap_or(0)
             }
@@ -500,6 +510,17 @@ pub(crate) fn check_limit(
     }
 }
 
+/// Memory that the host has left for programs; `None` where the system does not tell.
+fn host_memory_left_bytes() -> Option<u64> {
+    memory_left_bytes(&std::fs::read_to_string("/proc/meminfo").ok()?)
+}
+
+/// The line `MemAvailable:   5242880 kB` of Linux's `/proc/meminfo`, in bytes.
+fn memory_left_bytes(meminfo: &str) -> Option<u64> {
+    let line = meminfo.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
+    line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()?.checked_mul(1024)
+}
+
 fn usage(desc: &BufferDesc<'_>) -> vk::BufferUsageFlags {
     desc.usage | vk::BufferUsageFlags::TRANSFER_SRC | vk::BufferUsageFlags::TRANSFER_DST
 }
@@ -507,4 +528,17 @@ fn usage(desc: &BufferDesc<'_>) -> vk::BufferUsageFlags {
 fn buffer_info(desc: &BufferDesc<'_>) -> vk::BufferCreateInfo<'static> {
     // Rounded up so that an empty list can be bound as a vec4 array and whole words can be filled.
     vk::BufferCreateInfo::default().size(desc.bytes.max(1).next_multiple_of(16)).usage(usage(desc))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn memory_left_is_read_from_linux() {
+        let text = "MemTotal:       24000000 kB\nMemAvailable:    5242880 kB\n";
+        assert_eq!(memory_left_bytes(text), Some(5 << 30));
+        assert_eq!(memory_left_bytes("MemTotal: 1 kB"), None);
+        assert_eq!(memory_left_bytes("MemAvailable: many kB"), None);
+    }
 }

@@ -3,6 +3,8 @@
 //! Layout of every pipeline: set 0 is pushed with each pass, set 1 is an optional long-lived set, and one range of push
 //! constants serves all stages. Viewport, scissor, cull mode, front face, stencil reference and depth bias are dynamic.
 
+#[cfg(doc)]
+use crate::Features;
 use crate::device::{cache_file, lock};
 use crate::format::aspect_of;
 use crate::memory::check_limit;
@@ -36,6 +38,17 @@ pub struct ComputePipelineDesc<'a> {
     pub long_lived: Option<&'a [SlotLayout]>,
     /// Bytes of push constants, a multiple of 4.
     pub push_constant_bytes: u32,
+    /// Subgroups that it must run in; `None` leaves them to the driver, which may vary them.
+    pub subgroup: Option<RequiredSubgroup>,
+}
+
+/// Subgroups that a compute pipeline must run in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct RequiredSubgroup {
+    /// Invocations of a subgroup: one of those that [`Features::offers_subgroup_size`] tells.
+    pub invocations: u32,
+    /// Whether all invocations of every subgroup are active; the group's width is then a multiple of `invocations`.
+    pub is_full: bool,
 }
 
 /// One vertex buffer's layout.
@@ -239,6 +252,7 @@ struct Key {
     slots: Vec<SlotLayout>,
     long_lived: Option<Vec<SlotLayout>>,
     push_constant_bytes: u32,
+    subgroup: Option<RequiredSubgroup>,
     raster: Option<RasterKey>,
 }
 
@@ -354,27 +368,52 @@ impl Device {
     /// The compute pipeline of this description, made at its first use. May be called from several threads at once.
     ///
     /// # Errors
-    /// [`GpuError::Shader`] with the shader's name.
+    /// [`GpuError::Shader`] with the shader's name; [`GpuError::MissingFeature`] where the device does not offer the subgroup's size.
     pub fn compute_pipeline(&self, desc: &ComputePipelineDesc<'_>) -> Result<Pipeline, GpuError> {
         let stage = vk::ShaderStageFlags::COMPUTE;
+        self.check_subgroup(desc)?;
         let key = Key {
             shaders: vec![ShaderKey::new(stage, &desc.shader)],
             slots: desc.slots.to_vec(),
             long_lived: desc.long_lived.map(<[_]>::to_vec),
             push_constant_bytes: desc.push_constant_bytes,
+            subgroup: desc.subgroup,
             raster: None,
         };
         self.pipeline(key, |layout| {
             let mut stages = Stages::new(&self.0.raw);
             stages.add(stage, &desc.shader)?;
             let specials = stages.specialisations();
-            let infos = stages.infos(&specials);
-            let create = vk::ComputePipelineCreateInfo::default().stage(infos[0]).layout(layout);
+            let mut info = stages.infos(&specials)[0];
+            let mut size = vk::PipelineShaderStageRequiredSubgroupSizeCreateInfo::default();
+            if let Some(subgroup) = desc.subgroup {
+                size = size.required_subgroup_size(subgroup.invocations);
+                info = info.push_next(&mut size);
+                if subgroup.is_full {
+                    info = info.flags(vk::PipelineShaderStageCreateFlags::REQUIRE_FULL_SUBGROUPS);
+                }
+            }
+            let create = vk::ComputePipelineCreateInfo::default().stage(info).layout(layout);
             // SAFETY: module, layout and cache are this device's; the pointers live until the call returns.
             unsafe { self.0.raw.create_compute_pipelines(self.0.pipelines.driver_cache, &[create], None) }
                 .map_err(|(_, result)| refused(desc.shader.name, "vkCreateComputePipelines", result))
                 .map(|made| made[0])
         })
+    }
+
+    fn check_subgroup(&self, desc: &ComputePipelineDesc<'_>) -> Result<(), GpuError> {
+        match desc.subgroup {
+            Some(asked) if !self.features().offers_subgroup_size(asked.invocations) => {
+                Err(GpuError::MissingFeature {
+                    device: self.info().name.clone(),
+                    missing: format!(
+                        "subgroups of {}, which {} asks for",
+                        asked.invocations, desc.shader.name
+                    ),
+                })
+            }
+            _ => Ok(()),
+        }
     }
 
     /// The raster pipeline of this description, made at its first use. May be called from several threads at once.
@@ -399,6 +438,7 @@ impl Device {
             slots: desc.slots.to_vec(),
             long_lived: desc.long_lived.map(<[_]>::to_vec),
             push_constant_bytes: desc.push_constant_bytes,
+            subgroup: None,
             raster: Some(RasterKey {
                 patch_control_points: desc.patch_control_points,
                 vertex_bindings: desc.vertex_bindings.to_vec(),

@@ -1,6 +1,7 @@
 //! The crate on whatever device the machine has, validation with synchronization checks on.
 
 use afterlight_gpu::*;
+use afterlight_testkit::{Need, skip};
 use std::path::Path;
 
 fn open() -> Device {
@@ -74,6 +75,7 @@ fn scale_pipeline(device: &Device, spirv: &[u32], factor: u32) -> Pipeline {
             slots: &[slot(2, STORAGE, COMPUTE)],
             long_lived: None,
             push_constant_bytes: 8,
+            subgroup: None,
         })
         .expect("a pipeline")
 }
@@ -170,6 +172,52 @@ fn compute_writes_what_constants_and_push_constants_say() {
     assert_clean(&device);
 }
 
+/// Writes the size of each thread's subgroup, and how many of its threads are there.
+const SUBGROUPS: &str = "#version 460
+#extension GL_KHR_shader_subgroup_ballot : require
+layout(local_size_x = 128) in;
+layout(set = 0, binding = 2) buffer Words { uint words[]; };
+void main() {
+    words[2 * gl_LocalInvocationIndex] = gl_SubgroupSize;
+    words[2 * gl_LocalInvocationIndex + 1] = subgroupBallotBitCount(subgroupBallot(true));
+}";
+
+/// A pipeline runs in full subgroups of every size that the device offers; other sizes are refused.
+#[test]
+fn a_pipeline_requires_the_size_of_its_subgroups() {
+    let device = open();
+    let spirv = compile(glslang::ShaderStage::Compute, SUBGROUPS);
+    let out = storage(&device, "sizes", 8 * 128, MemoryKind::Readback);
+    let pipeline = |invocations| {
+        device.compute_pipeline(&ComputePipelineDesc {
+            shader: ShaderCode { name: "test/subgroups.comp", spirv: &spirv, constants: &[] },
+            slots: &[slot(2, STORAGE, COMPUTE)],
+            long_lived: None,
+            push_constant_bytes: 0,
+            subgroup: Some(RequiredSubgroup { invocations, is_full: true }),
+        })
+    };
+    for size in [1, 2, 4, 8, 16, 32, 64, 128] {
+        if !device.features().offers_subgroup_size(size) {
+            let error = pipeline(size).expect_err("a size that the device does not offer");
+            assert!(
+                error.to_string().contains(&format!("subgroups of {size}, which test/subgroups.comp")),
+                "{error}"
+            );
+            continue;
+        }
+        let mut encoder = device.encoder().expect("an encoder");
+        encoder.bind_pipeline(&pipeline(size).expect("a pipeline"));
+        encoder.push_descriptors(&device.push_set(&[whole(2, &out)]).expect("a push set"));
+        encoder.dispatch([1, 1, 1]);
+        device.submit(encoder).expect("done");
+        let mut bytes = vec![0; 8 * 128];
+        out.read(0, &mut bytes).expect("read");
+        assert!(words(&bytes).iter().all(|word| *word == size), "{size}: {:?}", words(&bytes));
+    }
+    assert_clean(&device);
+}
+
 #[test]
 fn a_dropped_resource_lives_until_its_commands_are_done() {
     let device = open();
@@ -210,7 +258,7 @@ fn timestamps_and_statistics_of_more_passes_than_a_pool_holds() {
     }
     let completed = device.submit(encoder).expect("done");
     if device.features().timestamp_valid_bits == 0 {
-        println!("skipped: times, the queue has no timestamps");
+        skip(Need::Timestamps, "the queue has none");
     } else {
         let sum: f64 =
             marks.iter().map(|(from, to, _)| completed.elapsed_ns(*from, *to).expect("timestamps")).sum();
@@ -223,7 +271,7 @@ fn timestamps_and_statistics_of_more_passes_than_a_pool_holds() {
             assert_eq!(statistics.compute_invocations, 640, "{statistics:?}");
         }
     } else {
-        println!("skipped: counts, the device has no pipeline statistics");
+        skip(Need::Statistics, "the device has none");
     }
     assert_clean(&device);
 }
@@ -528,24 +576,30 @@ fn validation_catches_a_missing_barrier() {
 #[test]
 fn what_the_device_cannot_hold_is_an_error_with_the_name() {
     let device = open();
-    let heap_bytes = device.features().device_local_heap_bytes;
-    if heap_bytes < device.features().max_buffer_bytes - 4096 {
+    let most_bytes = device.features().max_allocation_bytes;
+    if most_bytes < device.features().max_buffer_bytes - 4096 {
         let error = device
             .create_buffer(&BufferDesc {
                 name: "much too large",
-                bytes: heap_bytes + 1,
+                bytes: most_bytes + 1,
                 usage: vk::BufferUsageFlags::STORAGE_BUFFER,
                 memory: MemoryKind::DeviceLocal,
             })
-            .expect_err("larger than the memory");
-        let named = matches!(&error, GpuError::OutOfMemory { resource, bytes }
-            if resource == "much too large" && *bytes > heap_bytes);
+            .expect_err("larger than an allocation");
+        // What there is too little memory for is told before what no allocation holds.
+        let named = match &error {
+            GpuError::TooLarge { resource, found, .. } => resource == "much too large" && *found > most_bytes,
+            GpuError::OutOfMemory { resource, bytes } => resource == "much too large" && *bytes > most_bytes,
+            _ => false,
+        };
         assert!(named, "{error:?}");
     } else {
-        println!("skipped: no buffer of this device is larger than its memory");
+        skip(Need::ReachableLimit, "no buffer of this device is larger than an allocation");
     }
-    let error =
-        device.create_heap("vast heap", heap_bytes + 1, u32::MAX).err().expect("larger than the memory");
+    let error = device
+        .create_heap("vast heap", 2 * device.allocatable_bytes(), u32::MAX)
+        .err()
+        .expect("larger than the memory");
     assert!(matches!(&error, GpuError::OutOfMemory { resource, .. } if resource == "vast heap"), "{error:?}");
 
     let image = |width, samples, format| {
@@ -576,6 +630,7 @@ fn what_the_device_cannot_hold_is_an_error_with_the_name() {
             slots: &[],
             long_lived: None,
             push_constant_bytes: 0,
+            subgroup: None,
         })
         .expect_err("no SPIR-V");
     assert!(matches!(&error, GpuError::Shader { name, .. } if name == "test/none.comp"), "{error:?}");

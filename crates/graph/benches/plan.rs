@@ -27,6 +27,14 @@ impl Requirements for Pages {
     fn buffer(&self, _: &str, bytes: u64, _: vk::BufferUsageFlags) -> Result<MemoryNeed, GpuError> {
         Ok(MemoryNeed { bytes: bytes.next_multiple_of(256), alignment: 256, type_bits: 1 })
     }
+
+    fn most_allocation_bytes(&self) -> u64 {
+        u64::MAX
+    }
+
+    fn most_groups(&self) -> [u32; 3] {
+        [65_535; 3]
+    }
 }
 
 /// A compute shader that is never run: slots by name and kind, and whether it writes them.

@@ -201,6 +201,16 @@ pub enum GraphError {
         /// The kept resources.
         expected: String,
     },
+    /// A dispatch of more workgroups along an axis than the device takes.
+    #[error("pass {pass}: found a dispatch of {found:?} workgroups, expected at most {limit:?}")]
+    Groups {
+        /// The pass.
+        pass: String,
+        /// What was declared.
+        found: [u32; 3],
+        /// The device's limit.
+        limit: [u32; 3],
+    },
     /// A device error.
     #[error(transparent)]
     Gpu(#[from] GpuError),

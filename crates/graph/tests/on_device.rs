@@ -7,11 +7,12 @@ use afterlight_gpu::{
 };
 use afterlight_graph::{
     Blend, BufferRole, DepthTest, Draw, DrawCall, Executor, Graph, GraphError, ImageHandle, ImageInfo, Load,
-    PassRole, RasterState, StencilFace, StencilTest, Subresource,
+    MemoryNeed, PassRole, Plan, RasterState, Requirements, StencilFace, StencilTest, Subresource,
 };
 use afterlight_shader::Shader;
 use afterlight_shader::compile::Compiler;
 use afterlight_shader::manifest::{Variant, stage_of};
+use afterlight_testkit::{Need, has_tessellation, sample_counts, skip};
 
 const COLOR: vk::Format = vk::Format::R8G8B8A8_UNORM;
 const WIDTH: u32 = 37;
@@ -22,7 +23,7 @@ fn open() -> Option<Device> {
     match Device::open(&DeviceOptions { validate: true, ..DeviceOptions::default() }) {
         Ok(device) => Some(device),
         Err(error @ (GpuError::NoLoader { .. } | GpuError::NoDevice { .. })) => {
-            println!("skipped: {error}");
+            skip(Need::Device, &error.to_string());
             None
         }
         Err(error) => panic!("{error}"),
@@ -85,6 +86,113 @@ fn chain(g: &mut Graph, name: &str, (role, holds): (PassRole, BufferRole), shift
     g.copy_image(&format!("{name}/copy image"), role, &target, last)
 }
 
+/// Checks every pixel of an image that [`chain`] made.
+fn assert_pixels(bytes: &[u8], shift: u32, what: &str) {
+    for (index, texel) in bytes.chunks_exact(4).enumerate() {
+        let (x, y) = (index as u32 % WIDTH, index as u32 / WIDTH);
+        assert_eq!(texel, expected_pixel(x, y, shift), "{what} at {x},{y}");
+    }
+}
+
+/// A device that allocates little at once.
+struct SmallAllocations<'a> {
+    device: &'a Device,
+    most_bytes: u64,
+}
+
+impl Requirements for SmallAllocations<'_> {
+    fn image(
+        &self,
+        name: &str,
+        info: &ImageInfo,
+        usage: vk::ImageUsageFlags,
+    ) -> Result<MemoryNeed, GpuError> {
+        self.device.image(name, info, usage)
+    }
+    fn buffer(&self, name: &str, bytes: u64, usage: vk::BufferUsageFlags) -> Result<MemoryNeed, GpuError> {
+        Requirements::buffer(self.device, name, bytes, usage)
+    }
+    fn most_allocation_bytes(&self) -> u64 {
+        self.most_bytes
+    }
+    fn most_groups(&self) -> [u32; 3] {
+        self.device.most_groups()
+    }
+}
+
+/// A frame that is larger than one allocation lies in several, and gives the same pixels.
+#[test]
+fn a_chain_in_several_allocations_gives_the_right_pixels() {
+    let Some(device) = open() else { return };
+    let planned = |most_bytes: u64| {
+        let mut g = Graph::new();
+        for (name, shift) in [("first", 3), ("second", 200), ("third", 77)] {
+            let last = chain(&mut g, name, (PassRole::Shading, BufferRole::Targets), shift);
+            g.keep(&last);
+        }
+        g.plan(&SmallAllocations { device: &device, most_bytes }).expect("a valid frame")
+    };
+    let whole = planned(u64::MAX);
+    let largest = whole.resources.iter().map(|resource| resource.need.bytes).max().expect("resources");
+    let split = planned(largest);
+    assert!(split.heaps.len() > whole.heaps.len(), "{:?} and {:?}", split.heaps, whole.heaps);
+    assert!(split.heaps.iter().all(|heap| heap.bytes <= largest), "{:?}", split.heaps);
+    let mut executor = Executor::new(&device, split).expect("an executor");
+    for _ in 0..2 {
+        executor.run().expect("a run");
+        for (name, shift) in [("first/last", 3), ("second/last", 200), ("third/last", 77)] {
+            assert_pixels(&executor.read_image(name).expect("a kept image"), shift, name);
+        }
+    }
+    drop(executor);
+    assert_clean(&device);
+}
+
+/// A frame of so many buffers that live at once, half of an allocation each.
+fn large_frame(device: &Device, buffers: u64) -> Plan {
+    let mut g = Graph::new();
+    for index in 0..buffers {
+        let buffer = g.buffer(&format!("b{index}"), BufferRole::Counters, half_allocation(device));
+        let buffer = g.clear_buffer(&format!("clear {index}"), PassRole::Upkeep, buffer, 0);
+        g.keep(&buffer);
+    }
+    let plan = g.plan(device).expect("a valid frame");
+    let most = device.features().max_allocation_bytes;
+    assert!(plan.heaps.len() > 1 && plan.heaps.iter().all(|heap| heap.bytes <= most), "{:?}", plan.heaps);
+    plan
+}
+
+fn half_allocation(device: &Device) -> u64 {
+    device.features().max_allocation_bytes.min(device.features().max_buffer_bytes.saturating_sub(1 << 20)) / 2
+}
+
+/// One and a half allocations: on lavapipe (Mesa 22.3) more than the heap that it tells of as well. Nothing runs, so that no page is touched.
+#[test]
+fn a_frame_larger_than_one_allocation_is_allocated() {
+    let Some(device) = open() else { return };
+    if device.allocatable_bytes() < 4 * half_allocation(&device) {
+        return skip(Need::ReachableLimit, "the host has too little memory left for two allocations");
+    }
+    Executor::new(&device, large_frame(&device, 3)).expect("two allocations");
+    assert_clean(&device);
+}
+
+/// Each heap is an allocation that the device allows, all of them are more than it has: told before any is made.
+#[test]
+fn a_frame_larger_than_the_memory_is_told() {
+    let Some(device) = open() else { return };
+    // What a host has left may grow meanwhile.
+    let there = 2 * device.allocatable_bytes();
+    match Executor::new(&device, large_frame(&device, there / half_allocation(&device) + 1)) {
+        Err(GraphError::Gpu(GpuError::OutOfMemory { resource, bytes })) => {
+            assert!(resource.contains("the frame") && bytes > there, "{resource}: {bytes}");
+        }
+        Err(error) => panic!("{error}"),
+        Ok(_) => panic!("a frame of more than {there} bytes"),
+    }
+    assert_clean(&device);
+}
+
 #[test]
 fn a_chain_with_shared_memory_gives_the_right_pixels() {
     let Some(device) = open() else { return };
@@ -102,10 +210,7 @@ fn a_chain_with_shared_memory_gives_the_right_pixels() {
         let report = executor.run().expect("a run");
         for (name, shift) in [("first/last", 3), ("shared/second/last", 200)] {
             let bytes = executor.read_image(name).expect("a kept image");
-            for (index, texel) in bytes.chunks_exact(4).enumerate() {
-                let (x, y) = (index as u32 % WIDTH, index as u32 / WIDTH);
-                assert_eq!(texel, expected_pixel(x, y, shift), "run {run}: {name} at {x},{y}");
-            }
+            assert_pixels(&bytes, shift, &format!("run {run}: {name}"));
         }
         assert_eq!(report.passes.len(), 12);
         let sum: f64 = report.passes.iter().filter_map(|pass| pass.time_ns).sum();
@@ -276,9 +381,7 @@ fn arguments_made_on_the_device_draw_and_dispatch() {
 #[test]
 fn a_tessellated_triangle_is_counted() {
     let Some(device) = open() else { return };
-    let features = device.features();
-    if !features.tessellation_shader || !features.geometry_shader || !features.vertex_stores_and_atomics {
-        println!("skipped: {} has no tessellation or no counting there", device.info().name);
+    if !has_tessellation(&device) {
         return;
     }
     let mut g = Graph::new();
@@ -317,8 +420,7 @@ fn a_tessellated_triangle_is_counted() {
 #[test]
 fn four_samples_are_resolved() {
     let Some(device) = open() else { return };
-    if !device.features().supports_samples(4, false) {
-        println!("skipped: {} has no 4 samples", device.info().name);
+    if sample_counts(&device, &[4]).is_empty() {
         return;
     }
     let mut g = Graph::new();
@@ -414,9 +516,9 @@ fn validation_sees_a_dropped_barrier() {
 #[test]
 fn twenty_passes_are_recorded_quickly() {
     // Without validation: it is the recording that counts.
-    let Ok(device) = Device::open(&DeviceOptions::default()) else {
-        println!("skipped: no device");
-        return;
+    let device = match Device::open(&DeviceOptions::default()) {
+        Ok(device) => device,
+        Err(error) => return skip(Need::Device, &error.to_string()),
     };
     let mut g = Graph::new();
     for index in 0..4 {

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use afterlight_graph::gpu::{GpuError, Statistics};
-use afterlight_graph::{FrameReport, Plan, PlannedPass, Traffic};
+use afterlight_graph::{FrameReport, GraphError, Plan, PlannedPass, Traffic};
 use afterlight_image::{Rgba8Image, RgbaF32Image};
 use afterlight_measure::{Buffer, CostRecord, Memory, Pass, RunResult, Spread, Status};
 use afterlight_renderer::{Prepared, Renderer};
@@ -174,6 +174,7 @@ fn without_figures(chosen: &Chosen, error: &TechniqueError) -> Measured {
         | TechniqueError::Untessellated { .. }
         | TechniqueError::Samples { .. }
         | TechniqueError::TooLarge { .. }
+        | TechniqueError::Graph(GraphError::Groups { .. })
         | TechniqueError::UnknownView { .. }
         | TechniqueError::Gpu(GpuError::UnsupportedSamples { .. } | GpuError::UnsupportedFormat { .. }) => {
             Status::Unavailable

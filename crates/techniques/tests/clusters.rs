@@ -2,7 +2,7 @@
 
 mod common;
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use afterlight_image::Rgba8Image;
 use afterlight_oracle::{
@@ -22,7 +22,8 @@ use afterlight_techniques::{
     scene::{Camera, Light, LightKind, Projection, Scene},
     shader::Shader,
 };
-use common::{Stage, compiled_with_header, image_of, params, psnr, wider};
+use afterlight_testkit::Need;
+use common::{Stage, compiled, compiled_with_header, image_of, params, psnr, source, wider};
 use glam::{DVec4, Vec3};
 
 /// The lists of `clustered` with everything kept.
@@ -157,7 +158,7 @@ impl Found {
     /// Pairs of a pixel and a light with an end: on the list of the pixel's cell, reached, reached and not on the list.
     fn pairs(&self, lights: &[Light]) -> [usize; 3] {
         let world_from_clip = self.view.clip_from_world().inverse();
-        let places: std::collections::BTreeMap<u32, usize> =
+        let places: BTreeMap<u32, usize> =
             self.cells.iter().enumerate().map(|(place, (number, _))| (*number, place)).collect();
         let mut pairs = [0; 3];
         for (pixel, depth, distance_m) in &self.pixels {
@@ -464,6 +465,110 @@ fn grids_of_any_shape_agree() {
         let db = psnr(&reference, &image_of(&mut prepared));
         println!("{cluster_px} px, {slices} slices, {slicing}: {db:.2} dB");
         assert!(db >= 50.0, "{cluster_px} px, {slices} slices, {slicing}: {db:.2} dB");
+    }
+}
+
+/// Lights of each cell by its number, of a frame whose lists are made in subgroups of a size.
+fn lists_in_subgroups(
+    stage: &Stage,
+    settings: &Settings,
+    shaders: &[Shader],
+    size: Option<u32>,
+) -> BTreeMap<u32, Vec<u32>> {
+    let renderer = Renderer::with_scene(&stage.device, stage.uploaded.clone(), settings);
+    let mut renderer = renderer.unwrap_or_else(|e| panic!("{e}"));
+    renderer.add_shaders(shaders.iter().cloned());
+    let prepared = renderer.prepare_with(&Lists(DIVISIONS[0]), &Params::default(), |graph, _| {
+        if let Some(size) = size {
+            assert!(graph.set_subgroup_size("clustered/assign lights", size), "no such pass");
+        }
+    });
+    let mut prepared = prepared.unwrap_or_else(|e| panic!("{e}"));
+    prepared.run().unwrap_or_else(|e| panic!("{e}"));
+    let counters = prepared.counters().unwrap_or_else(|e| panic!("{e}"));
+    let cells = counters.iter().find(|c| c.name == "clusters").expect("a counter").needed as usize;
+    let [numbers, ends, lists] =
+        ["cells", "list ends", "cell lists"].map(|name| words(&mut prepared, &format!("clustered/{name}")));
+    let list = |end: &[u32]| lists[end[0] as usize..end[1] as usize].to_vec();
+    numbers
+        .chunks_exact(4)
+        .zip(ends.chunks_exact(2))
+        .take(cells)
+        .map(|(cell, end)| (cell[0], list(end)))
+        .collect()
+}
+
+/// Lists are the same whatever the size of subgroups. The mutant is what a thread's number was taken for, on a driver that varies the size up to
+/// 32 and runs this shader in smaller ones.
+#[test]
+fn lists_do_not_depend_on_the_size_of_subgroups() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=20000");
+    let settings = ordered(stage.settings((160, 90), 300));
+    let expected = lists_in_subgroups(&stage, &settings, &[], None);
+    assert!(expected.values().map(Vec::len).sum::<usize>() > 1000, "the view has few lights");
+    let sizes = gpu.features().subgroup_sizes();
+    for size in &sizes {
+        let found = lists_in_subgroups(&stage, &settings, &[], Some(*size));
+        assert!(found == expected, "subgroups of {size}: other lists");
+    }
+    let stride = compiled(
+        "lights/cells/assign.comp",
+        &source("lights/cells/assign.comp.glsl"),
+        &[],
+        &[("return gl_LocalInvocationIndex;", "return gl_SubgroupID * 32u + gl_SubgroupInvocationID;")],
+    );
+    let smallest = sizes.first().copied();
+    if smallest.unwrap_or(gpu.features().subgroup_size) < 32 {
+        let found = lists_in_subgroups(&stage, &settings, &[stride], smallest);
+        assert!(found != expected, "a wrong stride of subgroups goes unseen");
+    }
+    if sizes.len() < 2 {
+        let one = format!("{} offers one size, {}", gpu.info().name, gpu.features().subgroup_size);
+        afterlight_testkit::skip(Need::SubgroupSizes, &one);
+    }
+}
+
+/// 65,536 tiles, one more than most devices take groups along an axis.
+#[test]
+fn more_tiles_than_groups_of_a_row() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:intersect");
+    let settings = stage.settings((2048, 2048), 3);
+    let reference = stage.image(find("forward").unwrap(), &settings);
+    let technique = find("clustered").unwrap();
+    let sets = [("cluster-px", "8"), ("slices", "32")];
+    let mut prepared = stage.prepare_with(technique, &settings, &params(technique, &sets));
+    let db = psnr(&reference, &image_of(&mut prepared));
+    assert!(db >= 50.0, "{db:.2} dB to forward");
+}
+
+/// A sum of lists that passes 2³² looks small: here every list takes 2³² entries, which leave the sum at 0. The frame is refused with the bytes
+/// that it would take, on every device.
+#[test]
+fn a_sum_of_lists_that_begins_anew_is_told() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=17000&texture=64");
+    let settings = stage.settings((96, 54), 1000);
+    let counted = |times: &str| {
+        let shader = compiled(
+            "lights/cells/assign.comp",
+            &source("lights/cells/assign.comp.glsl"),
+            &[],
+            &[("atomicAdd(entries_needed, count)", &format!("atomicAdd(entries_needed, {times})"))],
+        );
+        let renderer = Renderer::with_scene(&stage.device, stage.uploaded.clone(), &settings);
+        let mut renderer = renderer.unwrap_or_else(|e| panic!("{e}"));
+        renderer.add_shaders([shader]);
+        renderer.prepare(find("clustered").unwrap(), &Params::default()).map(|_| ())
+    };
+    counted("count").unwrap_or_else(|e| panic!("{e}"));
+    match counted("0x80000000u) | atomicAdd(entries_needed, 0x80000000u") {
+        Err(error @ TechniqueError::TooLarge { .. }) => {
+            assert!(error.to_string().contains("bytes of the lists"), "{error}");
+        }
+        Err(error) => panic!("{error}"),
+        Ok(()) => panic!("a sum that has begun anew is taken for one that fits"),
     }
 }
 

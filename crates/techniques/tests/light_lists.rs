@@ -144,6 +144,29 @@ fn a_bound_on_nodes_is_told() {
     }
 }
 
+/// Counters are held far below 2³², here at 100: whoever finds more takes back what it added.
+#[test]
+fn counters_of_nodes_are_held_below_2_to_the_32() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=30000");
+    let settings = stage.settings((160, 90), 100);
+    for id in TECHNIQUES {
+        let technique = find(id).unwrap();
+        let sets = [("light-nodes", "16")];
+        let needed = rendered(&stage, technique, &settings, &sets, None).1[0].needed;
+        assert!(needed > 1000, "{id}: the view has {needed} pairs");
+        let held = mutant("MOST_NEEDED = 0xf0000000u", "MOST_NEEDED = 100u");
+        let counter = rendered(&stage, technique, &settings, &sets, Some(&held)).1.remove(0);
+        assert_eq!((counter.needed, counter.dropped), (100, 100), "{id}: of {needed}");
+        // The mutant: nobody takes back.
+        let path = source("lights/pixel_lists/append.frag.glsl");
+        let replaced = [("MOST_NEEDED = 0xf0000000u", "MOST_NEEDED = 100u"), ("0xffffffffu", "0u")];
+        let kept = compiled("lights/pixel_lists/append.frag#one", &path, &["ONE_DEPTH"], &replaced);
+        let counter = rendered(&stage, technique, &settings, &sets, Some(&kept)).1.remove(0);
+        assert_eq!(counter.needed, needed, "{id}: a counter that runs on goes unseen: {counter:?}");
+    }
+}
+
 /// The order of a list is the order in which the device ran; the sum hardly knows.
 #[test]
 fn frames_differ_by_rounding_alone() {

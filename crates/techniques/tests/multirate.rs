@@ -8,11 +8,12 @@ use afterlight_renderer::Renderer;
 use afterlight_techniques::{
     Indirect, Params, Settings, find,
     graph::{BufferRole, PassRole, gpu},
+    shader::Shader,
 };
-use common::{Stage, compiled, params, radiance_of};
+use common::{Stage, compiled, params, radiance_of, variant_with_header};
 
 fn counts(device: &gpu::Device) -> Vec<u32> {
-    [1, 4, 8].into_iter().filter(|n| *n == 1 || device.features().supports_samples(*n, false)).collect()
+    afterlight_testkit::sample_counts(device, &[1, 4, 8])
 }
 
 /// A way to a low rate: a technique, its parameters, and those of the technique at full rate that it is held against.
@@ -116,6 +117,58 @@ fn low_rates_against_full_rate() {
                 assert!(mutant > way.bound, "{what}: a mutant within the bound: {mutant:.4}");
             }
         }
+    }
+}
+
+/// Radiance of `dais-multirate` by quads whose shading pass runs in subgroups of a size.
+fn quads_in_subgroups(stage: &Stage, settings: &Settings, shaders: &[Shader], size: Option<u32>) -> Radiance {
+    let technique = find("dais-multirate").unwrap();
+    let params = params(technique, &[("visibility", "raster"), ("share", "quads")]);
+    let renderer = Renderer::with_scene(&stage.device, stage.uploaded.clone(), settings);
+    let mut renderer = renderer.unwrap_or_else(|e| panic!("{e}"));
+    renderer.add_shaders(shaders.iter().cloned());
+    let prepared = renderer.prepare_with(technique, &params, |graph, _| {
+        if let Some(size) = size {
+            assert!(graph.set_subgroup_size("dais-multirate/shade", size), "no such pass");
+        }
+    });
+    radiance_of(&mut prepared.unwrap_or_else(|e| panic!("{e}")))
+}
+
+/// Quads share the same samples whatever the size of subgroups. The mutants: the number that a thread was taken for, on a driver that
+/// varies the size up to 32; and quads that nobody finds, where every pixel gathers for itself.
+#[test]
+fn quads_do_not_depend_on_the_size_of_subgroups() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=17000&texture=64");
+    let settings = Settings { keep_hdr: true, ..stage.settings((97, 55), 0) }.with_effects(|effects| {
+        effects.shadows.map_size_px = 256;
+        effects.indirect.method = Indirect::Rsm;
+    });
+    let expected = quads_in_subgroups(&stage, &settings, &[], None);
+    let sizes = gpu.features().subgroup_sizes();
+    for size in &sizes {
+        let found = quads_in_subgroups(&stage, &settings, &[], Some(*size));
+        assert!(found == expected, "subgroups of {size}: another image");
+    }
+    let mutant = |from: &str, to: &str| {
+        variant_with_header("dais/shade.comp#one-quads", "surfaces/low_rate/low_rate.glsl", &[(from, to)])
+    };
+    let smallest = sizes.first().copied();
+    if smallest.unwrap_or(gpu.features().subgroup_size) < 32 {
+        let stride = mutant(
+            "uint quad = gl_LocalInvocationIndex / 4u",
+            "uint quad = (gl_SubgroupID * 32u + gl_SubgroupInvocationID) / 4u",
+        );
+        let found = quads_in_subgroups(&stage, &settings, &[stride], smallest);
+        assert!(found != expected, "a wrong stride of subgroups goes unseen");
+    }
+    let alone = mutant("bool in_order =", "bool in_order = false &&");
+    let found = quads_in_subgroups(&stage, &settings, &[alone], None);
+    assert!(found != expected, "quads that are never found go unseen");
+    if sizes.len() < 2 {
+        let one = format!("{} offers one size, {}", gpu.info().name, gpu.features().subgroup_size);
+        afterlight_testkit::skip(afterlight_testkit::Need::SubgroupSizes, &one);
     }
 }
 

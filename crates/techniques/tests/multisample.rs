@@ -14,7 +14,7 @@ const MIN_PSNR_DB: f64 = 40.0;
 
 /// Sample counts beyond one that the device has, of those that techniques are tested at.
 fn counts(device: &gpu::Device) -> Vec<u32> {
-    [4, 8].into_iter().filter(|count| device.features().supports_samples(*count, false)).collect()
+    afterlight_testkit::sample_counts(device, &[4, 8])
 }
 
 /// Ways in which a technique works, by its parameters, besides its lights.

@@ -275,9 +275,7 @@ fn every_technique_has_the_shadows_of_every_kind_of_light() {
 #[test]
 fn tessellated_surfaces_have_the_same_shadows() {
     let gpu = afterlight_testkit::gpu();
-    let f = gpu.features();
-    if !(f.tessellation_shader && f.geometry_shader && f.vertex_stores_and_atomics) {
-        println!("skipped: {} has no tessellation", gpu.info().name);
+    if !afterlight_testkit::has_tessellation(&gpu) {
         return;
     }
     let stage = Stage::new(&gpu, "builtin:colonnade?triangles=30000");

@@ -34,12 +34,7 @@ fn tessellated(settings: &Settings, samples: u32, edge_px: f32, displacement_m: 
 
 /// Whether the device has what tessellation takes, besides what all need.
 fn can(device: &gpu::Device) -> bool {
-    let f = device.features();
-    let there = f.tessellation_shader && f.geometry_shader && f.vertex_stores_and_atomics;
-    if !there {
-        println!("skipped: {} has no tessellation", device.info().name);
-    }
-    there
+    afterlight_testkit::has_tessellation(device)
 }
 
 /// Flat triangles in parts are the same triangles; displaced they are not.

@@ -538,7 +538,7 @@ fn none_is_the_scene_without_them() {
 #[test]
 fn tessellated_panes_are_those_that_are_not() {
     let gpu = afterlight_testkit::gpu();
-    if !gpu.features().tessellation_shader {
+    if !afterlight_testkit::has_tessellation(&gpu) {
         return;
     }
     let stage = Stage::new(&gpu, "builtin:colonnade?triangles=20000&texture=64");

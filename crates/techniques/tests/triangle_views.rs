@@ -39,7 +39,7 @@ fn ways(samples: u32) -> impl Iterator<Item = (&'static dyn Technique, Params, S
 
 /// Sample counts that the device has.
 fn counts(device: &gpu::Device) -> Vec<u32> {
-    [1, 4, 8].into_iter().filter(|n| *n == 1 || device.features().supports_samples(*n, false)).collect()
+    afterlight_testkit::sample_counts(device, &[1, 4, 8])
 }
 
 fn prepared(
@@ -118,8 +118,7 @@ fn samples_of_a_record_are_counted() {
 #[test]
 fn tessellated_surfaces_share_and_are_not_compared() {
     let gpu = afterlight_testkit::gpu();
-    if !gpu.features().tessellation_shader {
-        eprintln!("skipped: the device has no tessellation shaders");
+    if !afterlight_testkit::has_tessellation(&gpu) {
         return;
     }
     let stage = Stage::new(&gpu, "builtin:edge");

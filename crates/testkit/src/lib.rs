@@ -1,12 +1,12 @@
 //! GPU test harness: one validated device a process, its messages checked after every test.
 
-use std::{
-    io::Write,
-    path::PathBuf,
-    sync::{Mutex, MutexGuard, OnceLock, PoisonError},
-};
+use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
 use afterlight_gpu::{Device, DeviceOptions};
+
+mod skip;
+
+pub use skip::{Need, shared_scenes, skip};
 
 static DEVICE: OnceLock<Device> = OnceLock::new();
 static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
@@ -54,13 +54,34 @@ impl Drop for GpuTest {
     }
 }
 
-/// The folder of real scenes beside the repository, or `None`, said on standard error, where it is absent.
-pub fn shared_scenes() -> Option<PathBuf> {
-    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/scenes");
-    if path.is_dir() {
-        return Some(path);
+/// Those of `counts` samples a pixel that a device has; each that it lacks is told.
+///
+/// # Panics
+/// Where a lacking one is expected.
+#[track_caller]
+pub fn sample_counts(device: &Device, counts: &[u32]) -> Vec<u32> {
+    let has = |count: &u32| {
+        let there = *count == 1 || device.features().supports_samples(*count, false);
+        if !there {
+            let need = if *count == 4 { Need::FourSamples } else { Need::OtherSamples };
+            skip(need, &format!("{} has no {count} samples a pixel", device.info().name));
+        }
+        there
+    };
+    counts.iter().copied().filter(has).collect()
+}
+
+/// Whether a device has what tessellated surfaces take; where not, that is told.
+///
+/// # Panics
+/// Where it is expected.
+#[track_caller]
+pub fn has_tessellation(device: &Device) -> bool {
+    let features = device.features();
+    let there =
+        features.tessellation_shader && features.geometry_shader && features.vertex_stores_and_atomics;
+    if !there {
+        skip(Need::Tessellation, &format!("{} has no tessellation", device.info().name));
     }
-    // Not `eprintln`: the test harness would keep it from whoever runs the tests.
-    let _ = writeln!(std::io::stderr(), "skipped: no folder ../shared/scenes beside the repository");
-    None
+    there
 }

@@ -155,14 +155,23 @@ impl DrawTable {
             table.data.push(data);
             table.blended.push(info);
         }
-        let limit = u64::from(u32::MAX >> TRIANGLE_BITS);
-        if table.data.len() as u64 >= limit {
-            return Err(TechniqueError::TooLarge {
-                what: format!("draws of at most {DRAW_TRIANGLES} triangles in the scene"),
-                found: table.data.len() as u64,
-                limit: limit - 1,
-            });
-        }
+        check_count(table.data.len() as u64)?;
         Ok(table)
     }
+}
+
+/// Most draws of a scene: as many as the bits of a triangle ID beside the triangle's own tell apart, but for the draw whose last
+/// triangle would be all ones, no surface.
+pub(super) const DRAWS_MAX: u64 = (u32::MAX >> TRIANGLE_BITS) as u64 - 1;
+
+/// Checks that triangle IDs tell so many draws apart.
+pub(super) fn check_count(found: u64) -> Result<(), TechniqueError> {
+    if found > DRAWS_MAX {
+        return Err(TechniqueError::TooLarge {
+            what: format!("draws of at most {DRAW_TRIANGLES} triangles in the scene"),
+            found,
+            limit: DRAWS_MAX,
+        });
+    }
+    Ok(())
 }

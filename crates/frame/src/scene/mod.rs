@@ -4,6 +4,8 @@ pub mod blended;
 pub mod draw_list;
 pub mod draws;
 pub mod lights;
+#[cfg(test)]
+mod limit_tests;
 mod materials;
 mod pieces;
 mod textures;
@@ -42,6 +44,8 @@ pub struct SceneGpu {
     pub draw_data: gpu::Image,
     /// Eight texels a material.
     pub materials: gpu::Image,
+    /// Materials of the scene, those that no draw has included.
+    pub material_count: u32,
     /// Rows of texture transforms.
     pub uv_transforms: gpu::Buffer,
     /// The scene's textures.
@@ -115,6 +119,7 @@ impl SceneGpu {
         Ok(Arc::new(Self {
             bytes: buffers.iter().map(|b| b.allocated_bytes()).sum::<u64>() + images,
             texture_set: textures.set,
+            material_count: scene.materials.len() as u32,
             has_emission: scene.materials.iter().any(|m| !m.unlit && m.emissive_factor != [0.0; 3]),
             draw_names: draws.names,
             constants,

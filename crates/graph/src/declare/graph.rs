@@ -187,8 +187,22 @@ impl Graph {
             constants: Vec::new(),
             push: Vec::new(),
             dispatches: Vec::new(),
+            subgroup_size: None,
         };
         let pass = self.pass(name, role, PassKind::Compute(Box::new(node)));
         ComputePass { graph: self, pass }
+    }
+
+    /// Has the compute passes of that name, declared before, run in subgroups of `invocations`: see [`ComputePass::subgroup_size`]. For
+    /// tests that give a stage every size that a device offers. Returns whether there is such a pass.
+    pub fn set_subgroup_size(&mut self, pass: &str, invocations: u32) -> bool {
+        let mut found = false;
+        for node in self.passes.iter_mut().filter(|node| node.name == pass) {
+            if let PassKind::Compute(node) = &mut node.kind {
+                node.subgroup_size = Some(invocations);
+                found = true;
+            }
+        }
+        found
     }
 }

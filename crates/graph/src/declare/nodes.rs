@@ -163,6 +163,8 @@ pub(crate) struct ComputeNode {
     pub constants: Vec<(String, u32)>,
     pub push: Vec<u8>,
     pub dispatches: Vec<DispatchNode>,
+    /// Invocations that each subgroup must have.
+    pub subgroup_size: Option<u32>,
 }
 
 #[derive(Clone, Copy)]

@@ -84,6 +84,10 @@ impl Builder<'_> {
                     slots: &slots,
                     long_lived: texture_set.map(gpu::DescriptorSet::slots),
                     push_constant_bytes: bind::push_bytes(&[&node.shader]),
+                    subgroup: node.subgroup_size.map(|invocations| gpu::RequiredSubgroup {
+                        invocations,
+                        is_full: node.shader.reflection.local_size[0].is_multiple_of(invocations),
+                    }),
                 })?)
             }
             PassKind::Raster(node) => {

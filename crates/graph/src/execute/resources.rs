@@ -19,6 +19,14 @@ impl Requirements for Device {
     fn buffer(&self, name: &str, bytes: u64, usage: vk::BufferUsageFlags) -> Result<MemoryNeed, GpuError> {
         self.buffer_requirements(&buffer_desc(name, bytes, usage)).map(need)
     }
+
+    fn most_allocation_bytes(&self) -> u64 {
+        self.features().max_allocation_bytes
+    }
+
+    fn most_groups(&self) -> [u32; 3] {
+        self.features().max_workgroup_count
+    }
 }
 
 pub(super) fn need(from: gpu::MemoryRequirements) -> MemoryNeed {
@@ -49,7 +57,21 @@ pub(super) enum Physical {
     Unused,
 }
 
+/// Refuses a frame that is larger than the device's memory before a driver is asked: each of its heaps may fit, and some drivers promise
+/// more than there is.
+fn check_memory(device: &Device, plan: &Plan) -> Result<(), GraphError> {
+    let bytes = plan.peak_bytes();
+    if bytes > device.allocatable_bytes() {
+        let largest = plan.resources.iter().max_by_key(|resource| resource.need.bytes);
+        let largest = largest.map_or("", |resource| resource.name.as_str());
+        let resource = format!("the frame, {largest} and others");
+        return Err(GpuError::OutOfMemory { resource, bytes }.into());
+    }
+    Ok(())
+}
+
 pub(super) fn make_resources(device: &Device, plan: &Plan) -> Result<Vec<Physical>, GraphError> {
+    check_memory(device, plan)?;
     let heaps: Vec<gpu::Heap> = plan
         .heaps
         .iter()

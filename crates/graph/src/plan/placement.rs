@@ -24,8 +24,10 @@ pub struct PlannedHeap {
 }
 
 /// Places resources: large ones first, each at the lowest offset that no resource alive at the same time holds. Images
-/// and buffers have heaps of their own, so that no granularity between them matters.
-pub(super) fn place(resources: &mut [PlannedResource]) -> Vec<PlannedHeap> {
+/// and buffers have heaps of their own, so that no granularity between them matters. A heap is one allocation: where the next resource
+/// would make it larger than `most_bytes`, the resource goes to another one. A resource that is larger by itself has a heap alone,
+/// which the device then refuses.
+pub(super) fn place(resources: &mut [PlannedResource], most_bytes: u64) -> Vec<PlannedHeap> {
     let mut heaps: Vec<PlannedHeap> = Vec::new();
     let mut keys: Vec<(u32, bool)> = Vec::new();
     let mut order: Vec<usize> = (0..resources.len())
@@ -35,33 +37,47 @@ pub(super) fn place(resources: &mut [PlannedResource]) -> Vec<PlannedHeap> {
     for (placed, index) in order.iter().copied().enumerate() {
         let resource = &resources[index];
         let key = (resource.need.type_bits, matches!(resource.kind, ResourceKind::Image(_)));
-        let heap = keys.iter().position(|other| *other == key).unwrap_or_else(|| {
-            keys.push(key);
-            heaps.push(PlannedHeap { bytes: 0, alignment: 1, type_bits: key.0 });
-            heaps.len() - 1
+        let others = &order[..placed];
+        let mut fitting = (0..heaps.len()).filter(|heap| keys[*heap] == key).map(|heap| {
+            let offset = lowest_offset(resources, others, heap, resource);
+            (heap, offset, offset + resource.need.bytes)
         });
-        let mut taken: Vec<(u64, u64)> = order[..placed]
-            .iter()
-            .map(|other| &resources[*other])
-            .filter(|other| {
-                other.placement.is_some_and(|place| place.heap == heap) && overlap(other, resource)
-            })
-            .filter_map(|other| Some((other.placement?.offset, other.placement?.offset + other.need.bytes)))
-            .collect();
-        taken.sort_unstable();
-        let mut offset = 0u64;
-        for (start, end) in taken {
-            if start >= offset + resource.need.bytes {
-                break;
-            }
-            offset = offset.max(end).next_multiple_of(resource.need.alignment);
+        let (heap, offset, end) = fitting.find(|(.., end)| *end <= most_bytes).unwrap_or_else(|| {
+            keys.push(key);
+            (heaps.len(), 0, resource.need.bytes)
+        });
+        if heap == heaps.len() {
+            heaps.push(PlannedHeap { bytes: 0, alignment: 1, type_bits: key.0 });
         }
-        let end = offset + resource.need.bytes;
         heaps[heap].bytes = heaps[heap].bytes.max(end);
         heaps[heap].alignment = heaps[heap].alignment.max(resource.need.alignment);
         resources[index].placement = Some(Placement { heap, offset });
     }
     heaps
+}
+
+/// Lowest offset in a heap at which a resource meets none of `others` that is alive at the same time.
+fn lowest_offset(
+    resources: &[PlannedResource],
+    others: &[usize],
+    heap: usize,
+    resource: &PlannedResource,
+) -> u64 {
+    let mut taken: Vec<(u64, u64)> = others
+        .iter()
+        .map(|other| &resources[*other])
+        .filter(|other| other.placement.is_some_and(|place| place.heap == heap) && overlap(other, resource))
+        .filter_map(|other| Some((other.placement?.offset, other.placement?.offset + other.need.bytes)))
+        .collect();
+    taken.sort_unstable();
+    let mut offset = 0u64;
+    for (start, end) in taken {
+        if start >= offset + resource.need.bytes {
+            break;
+        }
+        offset = offset.max(end).next_multiple_of(resource.need.alignment);
+    }
+    offset
 }
 
 /// Whether two resources are alive at the same time.

@@ -11,7 +11,7 @@ use super::placement::place;
 use super::requirements::{MemoryNeed, Requirements};
 use super::resolve::{Resolved, resolve_pass};
 use super::{Plan, PlannedPass, PlannedResource};
-use crate::declare::{Graph, ResourceKind};
+use crate::declare::{DispatchCall, Graph, PassKind, ResourceKind};
 use crate::error::GraphError;
 
 impl Graph {
@@ -19,7 +19,7 @@ impl Graph {
     ///
     /// # Errors
     /// The first error of the declaration, a slot that does not fit its shader, a use that excludes another, a read
-    /// before any write, or an image or buffer that `requirements` cannot make.
+    /// before any write, a dispatch that is too large, or an image or buffer that `requirements` cannot make.
     pub fn plan(mut self, requirements: &dyn Requirements) -> Result<Plan, GraphError> {
         if !self.errors.is_empty() {
             return Err(self.errors.swap_remove(0));
@@ -33,6 +33,7 @@ impl Graph {
             .map(|(pass, resolved)| join_uses(&pass.name, &resolved.accesses, &self.resources))
             .collect::<Result<_, _>>()?;
         check_reads_after_writes(&self, &uses, &resolved)?;
+        check_dispatches(&self, requirements)?;
         for ((pass, resolved), uses) in self.passes.iter().zip(&mut resolved).zip(&uses) {
             settle_layouts(&pass.name, &mut resolved.accesses, uses, &self.resources)?;
         }
@@ -42,7 +43,7 @@ impl Graph {
             uses.iter().zip(&live).filter(|(_, live)| **live).map(|(uses, _)| uses).collect();
         let lifetimes = lifetimes(&self, &live_uses);
         let mut resources = planned_resources(&self, &resolved, &live, &lifetimes, requirements)?;
-        let heaps = place(&mut resources);
+        let heaps = place(&mut resources, requirements.most_allocation_bytes());
 
         let mut planner = BarrierPlanner::new(&resources, &live_uses);
         let barriers: Vec<Vec<Barrier>> = (0..live_uses.len()).map(|pass| planner.pass(pass)).collect();
@@ -80,6 +81,22 @@ impl Graph {
         }
         Ok(plan)
     }
+}
+
+/// Checks that no dispatch has more workgroups along an axis than the device takes; what the device itself writes for indirect ones is not
+/// known here.
+fn check_dispatches(graph: &Graph, requirements: &dyn Requirements) -> Result<(), GraphError> {
+    let limit = requirements.most_groups();
+    for pass in &graph.passes {
+        let PassKind::Compute(node) = &pass.kind else { continue };
+        for dispatch in &node.dispatches {
+            let DispatchCall::Direct(found) = dispatch.call else { continue };
+            if found.iter().zip(limit).any(|(found, limit)| *found > limit) {
+                return Err(GraphError::Groups { pass: pass.name.clone(), found, limit });
+            }
+        }
+    }
+    Ok(())
 }
 
 fn planned_resources(

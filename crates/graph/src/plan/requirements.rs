@@ -1,4 +1,4 @@
-//! What resources need of memory, as a device or a stand-in for it answers.
+//! What resources need of memory and what limits there are, as a device or a stand-in for it answers.
 
 use afterlight_gpu::{GpuError, vk};
 
@@ -15,7 +15,7 @@ pub struct MemoryNeed {
     pub type_bits: u32,
 }
 
-/// Answers what images and buffers need of memory: a device, or a stand-in for tests.
+/// Answers what images and buffers need of memory, and what a device takes at most: a device, or a stand-in for tests.
 pub trait Requirements {
     /// Returns what an image of that description and usage needs.
     ///
@@ -29,4 +29,10 @@ pub trait Requirements {
     /// # Errors
     /// The device cannot make such a buffer.
     fn buffer(&self, name: &str, bytes: u64, usage: vk::BufferUsageFlags) -> Result<MemoryNeed, GpuError>;
+
+    /// Returns the largest allocation in bytes: no heap of a plan is larger, unless one resource is.
+    fn most_allocation_bytes(&self) -> u64;
+
+    /// Returns the most workgroups of a dispatch along each axis.
+    fn most_groups(&self) -> [u32; 3];
 }

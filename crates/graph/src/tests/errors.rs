@@ -114,6 +114,26 @@ fn an_unknown_constant_and_wrong_push_bytes() {
     names_all(&message(g), &["pass p", "found 8 bytes", "expected 16"]);
 }
 
+/// 65,535 workgroups are what most devices take along an axis; one more is told before a driver sees it.
+#[test]
+fn a_dispatch_that_is_too_large() {
+    let cull = shader("cull", Stage::Compute, &[Slot("list", BindingKind::StorageBuffer, "w")]);
+    for (groups, fits) in [([65_535, 1, 1], true), ([65_536, 1, 1], false), ([1, 65_536, 1], false)] {
+        let mut g = Graph::new();
+        let list = g.buffer("list", BufferRole::Lights, 4);
+        let mut pass = g.compute("p", PassRole::LightAssignment, &cull);
+        let list = pass.write("list", list);
+        pass.dispatch(groups);
+        pass.finish();
+        g.keep(&list);
+        let told = message(g);
+        match fits {
+            true => assert_eq!(told, "no error"),
+            false => names_all(&told, &["pass p", "65536", "65535"]),
+        }
+    }
+}
+
 #[test]
 fn a_wrong_stage() {
     let mut g = Graph::new();

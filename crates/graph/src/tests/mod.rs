@@ -12,6 +12,9 @@ use afterlight_shader::{
 
 use crate::{ImageInfo, MemoryNeed, Requirements};
 
+/// Largest allocation of the made-up device.
+pub const FAKE_ALLOCATION_BYTES: u64 = 1 << 30;
+
 /// Memory as a made-up device would want it: 4 KiB pages for images, 256 bytes for buffers, a type of its own for
 /// multisampled images.
 pub struct FakeDevice;
@@ -25,6 +28,14 @@ impl Requirements for FakeDevice {
 
     fn buffer(&self, _: &str, bytes: u64, _: vk::BufferUsageFlags) -> Result<MemoryNeed, GpuError> {
         Ok(MemoryNeed { bytes: bytes.next_multiple_of(256), alignment: 256, type_bits: 7 })
+    }
+
+    fn most_allocation_bytes(&self) -> u64 {
+        FAKE_ALLOCATION_BYTES
+    }
+
+    fn most_groups(&self) -> [u32; 3] {
+        [65_535; 3]
     }
 }
 

@@ -5,7 +5,7 @@ use afterlight_shader::{BindingKind, Stage};
 use proptest::prelude::*;
 
 use super::checker::Checker;
-use super::{FakeDevice, Slot, shader, with_outputs};
+use super::{FAKE_ALLOCATION_BYTES, FakeDevice, Slot, shader, with_outputs};
 use crate::{
     BufferHandle, BufferRole, DepthTest, Draw, DrawCall, Graph, ImageHandle, ImageInfo, Load, PassRole,
     PassWork, Plan, RasterState, Subresource,
@@ -54,6 +54,51 @@ fn a_chain_shares_two_places() {
     assert_eq!(plan.passes.len(), 6);
     assert_eq!(plan.peak_bytes(), 2 * 1024, "neighbours live together, others do not");
     assert_eq!(plan.technique_bytes(), 6 * 1024);
+    Checker::run(&plan).expect("a sound plan");
+}
+
+/// Buffers of `bytes` each, all of which live to the end.
+fn kept_buffers(bytes: &[u64]) -> Plan {
+    let mut g = Graph::new();
+    for (index, bytes) in bytes.iter().enumerate() {
+        let buffer = g.buffer(&format!("b{index}"), BufferRole::Lights, *bytes);
+        let buffer = fill(&mut g, &format!("p{index}"), buffer);
+        g.keep(&buffer);
+    }
+    g.plan(&FakeDevice).expect("a valid frame")
+}
+
+/// Heaps are allocations: none is larger than the device allows, and what fits one heap stays in one.
+#[test]
+fn heaps_are_no_larger_than_an_allocation() {
+    let most = FAKE_ALLOCATION_BYTES;
+    let heaps = |bytes: &[u64]| -> Vec<u64> {
+        let plan = kept_buffers(bytes);
+        Checker::run(&plan).expect("a sound plan");
+        plan.heaps.iter().map(|heap| heap.bytes).collect()
+    };
+    assert_eq!(heaps(&[most / 2, most / 2]), [most], "what fits is one allocation");
+    assert_eq!(heaps(&[most / 2, most / 2, 256]), [most, 256], "one byte more is another");
+    assert_eq!(heaps(&[most, most, 256]), [most, most, 256]);
+    assert_eq!(heaps(&[most - 256, 512, 256]), [most, 512], "a small one takes what a large one left");
+    assert_eq!(heaps(&[most + 256, 256]), [most + 256, 256], "no heap holds it: the device names it");
+}
+
+/// Resources that live at different times still share memory where heaps are split.
+#[test]
+fn split_heaps_are_shared_over_time() {
+    let mut g = Graph::new();
+    let bytes = FAKE_ALLOCATION_BYTES / 2 + 256;
+    let first = g.buffer("b0", BufferRole::Lights, bytes);
+    let mut last = fill(&mut g, "p0", first);
+    for index in 1..6 {
+        let next = g.buffer(&format!("b{index}"), BufferRole::Lights, bytes);
+        last = map(&mut g, &format!("p{index}"), &last, next);
+    }
+    g.keep(&last);
+    let plan = g.plan(&FakeDevice).expect("a valid frame");
+    let heaps: Vec<u64> = plan.heaps.iter().map(|heap| heap.bytes).collect();
+    assert_eq!(heaps, [bytes, bytes], "two live at once");
     Checker::run(&plan).expect("a sound plan");
 }
 

@@ -436,3 +436,16 @@ fn light(file: &Path, index: usize, json: &JsonLight) -> Result<Light, SceneErro
     let range_m = json.range.unwrap_or(f32::INFINITY);
     Ok(Light { kind, position_ws: Vec3::ZERO, direction_ws: Vec3::NEG_Z, intensity, range_m })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_scene_has_at_most_4_million_nodes_and_draws() {
+        let file = Path::new("test.gltf");
+        assert!(check_count(file, 1 << 22).is_ok());
+        let error = check_count(file, (1 << 22) + 1).expect_err("one more").to_string();
+        assert!(error.contains("found 4194305, expected at most 4194304"), "{error}");
+    }
+}

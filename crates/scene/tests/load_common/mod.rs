@@ -6,14 +6,9 @@ use std::path::{Path, PathBuf};
 use afterlight_scene::{LoadOptions, Scene, SceneError, load_bytes};
 use serde_json::{Value, json};
 
-/// The folder of reference scenes, or `None` with a line that says that a test is skipped.
+/// The folder of reference scenes, or `None`, told and counted.
 pub fn scenes_dir() -> Option<PathBuf> {
-    let dir = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/scenes");
-    if dir.is_dir() {
-        return Some(dir);
-    }
-    println!("skipped: no reference scenes at {}", dir.display());
-    None
+    afterlight_testkit::shared_scenes()
 }
 
 /// All files below a folder with one of the extensions, sorted.

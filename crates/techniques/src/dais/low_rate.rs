@@ -61,10 +61,10 @@ impl RateParams {
     pub const FULL: Self = Self { rate: Rate::Full, share: Share::Auto };
 }
 
-/// Subgroup quad operations in compute shaders.
+/// Subgroup quad operations, and votes, in compute shaders.
 fn has_quads(features: &gpu::Features) -> bool {
     use gpu::vk::{ShaderStageFlags, SubgroupFeatureFlags};
-    features.subgroup_operations.contains(SubgroupFeatureFlags::QUAD)
+    features.subgroup_operations.contains(SubgroupFeatureFlags::QUAD | SubgroupFeatureFlags::VOTE)
         && features.subgroup_stages.contains(ShaderStageFlags::COMPUTE)
 }
 

@@ -34,6 +34,16 @@ const fn references_max(samples: u32) -> u32 {
     1 << if samples > 8 { 27 } else { 28 }
 }
 
+/// Checks that references tell the triangles of so many draws apart.
+fn check_draws(draws: u64, most: u32) -> Result<(), TechniqueError> {
+    let triangles = u64::from(DRAW_TRIANGLES) * draws;
+    if triangles > u64::from(most) {
+        let what = "dais-list: triangles that a reference tells apart".to_owned();
+        return Err(TechniqueError::TooLarge { what, found: triangles, limit: most.into() });
+    }
+    Ok(())
+}
+
 /// Rows that bands are multiples of: whole quads, and tiles of the raster part.
 const BAND_ROWS: u32 = 16;
 static INFO: Info = Info {
@@ -185,11 +195,7 @@ impl Triangles {
             let cache = Cache::new(graph, INFO.id, cache);
             return Ok(Self::Listed { cache, list: triangles::List::new(graph, frame, INFO.id, most)? });
         }
-        let triangles = u64::from(DRAW_TRIANGLES) * frame.scene.draw_count() as u64;
-        if triangles > u64::from(most) {
-            let what = "dais-list: triangles that a reference tells apart".to_owned();
-            return Err(TechniqueError::TooLarge { what, found: triangles, limit: most.into() });
-        }
+        check_draws(frame.scene.draw_count() as u64, most)?;
         Ok(Self::Marked(triangles::bits(graph, frame, INFO.id, 0)))
     }
 
@@ -311,5 +317,19 @@ impl Band {
         fill.draw(frame, &mut pass);
         pass.finish();
         Ok((depth, lists, triangles))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn references_tell_the_triangles_of_262144_draws_apart() {
+        for (samples, draws) in [(8, 262_144), (16, 131_072)] {
+            assert!(check_draws(draws, references_max(samples)).is_ok());
+            let error = check_draws(draws + 1, references_max(samples)).expect_err("one more").to_string();
+            assert!(error.contains("dais-list") && error.contains(&(1024 * draws).to_string()), "{error}");
+        }
     }
 }

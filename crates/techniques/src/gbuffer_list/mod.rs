@@ -65,6 +65,11 @@ const NARROW_SAMPLES_MAX: u32 = 8;
 /// Samples a pixel that the first frame of a view is given room for: a quarter of the pixels lie on edges.
 const FIRST_GUESS_PIXELS: u32 = 4;
 
+/// Whether pointers of 32 bits name so many blocks, of so many samples.
+fn fits_narrow(blocks: u64, samples: u32) -> bool {
+    blocks <= NARROW_BLOCKS_MAX && samples <= NARROW_SAMPLES_MAX
+}
+
 /// How the blocks of a frame are laid out.
 struct Layout {
     /// Samples a pixel. One where no pixel may hold more than its own block and compute fills: then more have no use.
@@ -91,7 +96,7 @@ impl Layout {
         let blocks = pixels + u64::from(capacity);
         let by_compute = params.fill == Fill::Compute;
         let samples = if capacity == 0 && fixed.is_some() && by_compute { 1 } else { frame.samples };
-        let narrow = blocks <= NARROW_BLOCKS_MAX && samples <= NARROW_SAMPLES_MAX;
+        let narrow = fits_narrow(blocks, samples);
         let pointer_words = match (params.pointer, narrow) {
             (Pointer::Narrow, false) => {
                 return Err(TechniqueError::Conflict {
@@ -332,4 +337,15 @@ fn fill_by_raster(
     fill.draw(frame, &mut pass);
     pass.finish();
     Ok(Lists { blocks, count, samples: Samples::Depth(depth) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn narrow_pointers_name_2_to_the_26_blocks_of_8_samples() {
+        assert!(fits_narrow(1 << 26, 8));
+        assert!(!fits_narrow((1 << 26) + 1, 8) && !fits_narrow(1, 16));
+    }
 }

@@ -204,6 +204,25 @@ pub fn compiled_with_header(name: &str, header: &str, replaced: &[(&str, &str)])
     })
 }
 
+/// Compiles a variant that a technique's `variants.txt` lists, with parts of a header's text replaced.
+pub fn variant_with_header(name: &str, header: &str, replaced: &[(&str, &str)]) -> Shader {
+    let [techniques, stages, _] = folders();
+    let prefix = name.split('/').next().expect("a folder's name");
+    let includes = [techniques.clone(), stages.clone()];
+    let listed =
+        manifest::read(prefix, &techniques.join(prefix), &includes).unwrap_or_else(|e| panic!("{e}"));
+    let variant = listed.into_iter().find(|variant| variant.name == name);
+    let variant = variant.unwrap_or_else(|| panic!("{name}: found no such variant"));
+    in_temporary_folder(|changed| {
+        let written = changed.join(header);
+        std::fs::create_dir_all(written.parent().expect("a folder")).expect("a temporary folder");
+        std::fs::write(&written, replaced_text(&source(header), replaced))
+            .expect("a file in the temporary folder");
+        let compiler = Compiler::new().override_dir(changed).include_dir(techniques).include_dir(stages);
+        compiler.compile(&variant).unwrap_or_else(|e| panic!("{e}")).shader
+    })
+}
+
 /// A folder for one call: tests of one process compile at the same time.
 fn in_temporary_folder<T>(use_it: impl FnOnce(&Path) -> T) -> T {
     let thread = format!("{:?}", std::thread::current().id()).replace(['(', ')'], "");

@@ -166,7 +166,8 @@ fn sraa(
 
     let mut pass =
         frame.compute(graph, "post/sraa", PassRole::Filter, &frame.shader("compose/post/sraa.comp")?);
-    pass.constant("SAMPLES", samples).read("color", shown.color).read("hdr", shown.hdr);
+    pass.constant("SAMPLES", samples).constant("WIDE_MATERIALS", wide_materials(frame));
+    pass.read("color", shown.color).read("hdr", shown.hdr);
     pass.read("sample_surfaces", &sample_surfaces).read("sample_depths", &sample_depths);
     pass.read("center_surfaces", &center_surfaces).read("center_depths", &center_depths);
     let target = pass.write("final_color", target);
@@ -183,6 +184,14 @@ fn sraa_samples(supported: impl Fn(u32) -> bool) -> Result<u32, TechniqueError> 
     })
 }
 
+/// Materials that SRAA tells apart by eight bits.
+const NARROW_MATERIALS: u32 = 256;
+
+/// 1 where the scene has more materials than eight bits tell apart.
+fn wide_materials(frame: &Frame<'_>) -> u32 {
+    u32::from(frame.scene.material_count > NARROW_MATERIALS)
+}
+
 /// Rasterises planes and materials of the visible surfaces, and their depths: the pass `post/sraa-…`.
 fn surfaces(
     graph: &mut Graph,
@@ -197,9 +206,14 @@ fn surfaces(
             frame.image_info(format).samples(samples),
         )
     };
-    let planes = image(graph, "surfaces", vk::Format::R8G8B8A8_UNORM);
+    let format = match wide_materials(frame) {
+        0 => vk::Format::R8G8B8A8_UNORM,
+        _ => vk::Format::R16G16B16A16_UNORM,
+    };
+    let planes = image(graph, "surfaces", format);
     let depths = image(graph, "depths", vk::Format::D32_SFLOAT);
-    let surfaces = SceneDraws::shaded(frame, "compose/post/sraa.frag", "compose/post/sraa.frag#mask")?;
+    let mut surfaces = SceneDraws::shaded(frame, "compose/post/sraa.frag", "compose/post/sraa.frag#mask")?;
+    surfaces.constants.push(("WIDE_MATERIALS".to_owned(), wide_materials(frame)));
     let mut pass = graph.raster(&format!("post/sraa-{what}"), PassRole::Filter);
     frame.bind_scene(&mut pass);
     // Depth 0 tells what holds nothing: the planes need no clear.

@@ -7,7 +7,7 @@
 // sample of the surface at its own pixel's centre takes that radiance alone, so that textures stay sharp. Materials must be
 // equal, so that two on one plane do not mix.
 // In: color, RGBA8, sRGB-encoded; hdr, RGBA16F, radiance; sample_surfaces, sample_depths, SAMPLES samples a pixel, and
-// center_surfaces, center_depths, one, RGBA8 (sraa.frag.glsl) and D32F. Out: final_color, RGBA8, sRGB-encoded.
+// center_surfaces, center_depths, one, RGBA8 or RGBA16 (sraa.frag.glsl) and D32F. Out: final_color, RGBA8, sRGB-encoded.
 // One thread a pixel, groups of 8x8.
 #version 460
 #extension GL_GOOGLE_include_directive : require
@@ -26,6 +26,11 @@ layout(set = 0, binding = 15, rgba8) writeonly uniform image2D final_color;
 
 // 2, 4 or 8.
 layout(constant_id = 8) const uint SAMPLES = 4u;
+
+// 1 where surfaces have numbers of materials above 255: RGBA16.
+layout(constant_id = 9) const uint WIDE_MATERIALS = 0u;
+// The number of no material.
+const uint NO_MATERIAL = 0xffffffffu;
 
 // Vulkan's standard sample locations in a pixel, by count.
 const vec2 SAMPLES_2[2] = vec2[](vec2(0.75, 0.75), vec2(0.25, 0.25));
@@ -48,11 +53,20 @@ struct Plane {
 };
 
 Plane plane_at(vec2 at_px, vec4 packed_surface, float depth) {
-    uint bits = packUnorm4x8(packed_surface);
     Plane p;
     p.covered = depth > 0.0;
-    p.material = p.covered ? bits >> 24 : 0x100u;
-    p.normal_ws = octahedral_decode(vec2(bits & 0xfffu, bits >> 12 & 0xfffu) / 4095.0 * 2.0 - 1.0);
+    vec2 octahedral;
+    if (WIDE_MATERIALS != 0u) {
+        uvec2 halves = uvec2(round(packed_surface.zw * 65535.0));
+        p.material = halves.x | halves.y << 16;
+        octahedral = packed_surface.xy;
+    } else {
+        uint bits = packUnorm4x8(packed_surface);
+        p.material = bits >> 24;
+        octahedral = vec2(bits & 0xfffu, bits >> 12 & 0xfffu) / 4095.0;
+    }
+    p.material = p.covered ? p.material : NO_MATERIAL;
+    p.normal_ws = octahedral_decode(octahedral * 2.0 - 1.0);
     p.position_ws = p.covered ? position_from_depth(at_px * 2.0 / vec2(frame.size_px) - 1.0, depth) : vec3(0.0);
     return p;
 }

@@ -7,7 +7,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_basic : require
-#extension GL_KHR_shader_subgroup_ballot : require
+#extension GL_KHR_shader_subgroup_arithmetic : require
 #include "lights/cells/bounds.glsl"
 #include "light_cone.glsl"
 
@@ -42,12 +42,15 @@ uint list_capacity() {
 }
 
 uint lane() {
-    return gl_SubgroupID * gl_SubgroupSize + gl_SubgroupInvocationID;
+    return gl_LocalInvocationIndex;
 }
 
 // Collects one bit from every thread of the group. All threads must call it.
+//
+// Each thread brings its bit in its own place, instead of a ballot being shifted to where the subgroup begins: where a driver varies the size of
+// subgroups, gl_SubgroupSize says the largest, and gl_SubgroupID times it is not where a subgroup begins.
 uint group_ballot(bool value) {
-    uint bits = subgroupBallot(value).x;
+    uint bits = subgroupOr(value ? 1u << lane() : 0u);
     if (gl_NumSubgroups == 1u) {
         return bits;
     }
@@ -57,7 +60,7 @@ uint group_ballot(bool value) {
     }
     barrier();
     if (subgroupElect()) {
-        atomicOr(group_bits, bits << (gl_SubgroupID * gl_SubgroupSize));
+        atomicOr(group_bits, bits);
     }
     barrier();
     return group_bits;

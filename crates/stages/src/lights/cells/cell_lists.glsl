@@ -34,12 +34,16 @@ bool cell_of(uvec2 pixel, float distance_m, out uint place) {
         return distance_m >= cell.nearest_m && distance_m <= cell.farthest_m &&
                (cell.steps >> step_of(distance_m, cell.nearest_m, cell.farthest_m) & 1u) != 0u;
     }
+    place = 0u;
+    // Asked before the slice is: what is no number has none, and would read anywhere.
+    if (!(distance_m >= frame.distance_range_m.x && distance_m <= frame.distance_range_m.y)) {
+        return false;
+    }
     uint slice = slice_of(distance_m);
     uvec2 word = cell_words[tile * WORDS + slice / 32u];
     uint bit = 1u << (slice & 31u);
     place = word.y + uint(bitCount(word.x & (bit - 1u)));
-    bool within = distance_m >= frame.distance_range_m.x && distance_m <= frame.distance_range_m.y;
-    return within && (word.x & bit) != 0u && place < uint(cells.length());
+    return (word.x & bit) != 0u && place < uint(cells.length());
 }
 
 // A colour of its own for the cell of a surface; white where none holds it.

@@ -1,4 +1,4 @@
-// Finds the cells that hold a surface: a group a tile.
+// Finds the cells that hold a surface: a group a tile, in rows that the device takes; the last row may have groups without a tile.
 //
 // In: what the source reads. Out: Cells; CellWords: bits of the slices, number of cells before
 // them; CellCount: cells in all, and those without room. Numbers of cells depend on the order in which groups run; lists do not.
@@ -70,8 +70,8 @@ void visit_distance(float distance_m) {
 }
 
 // Visits all surfaces of the tile: their distances, or the steps that hold them.
-void visit_surfaces() {
-    uvec2 first = uvec2(gl_WorkGroupID.x % tiles_across(), gl_WorkGroupID.x / tiles_across()) * LIGHT_TILE_PX;
+void visit_surfaces(uint tile) {
+    uvec2 first = uvec2(tile % tiles_across(), tile / tiles_across()) * LIGHT_TILE_PX;
     uvec2 size = min(first + LIGHT_TILE_PX, frame.size_px) - first;
     for (uint i = gl_LocalInvocationIndex; i < size.x * size.y; i += 256u) {
         visit_pixel(ivec2(first + uvec2(i % size.x, i / size.x)));
@@ -116,7 +116,10 @@ void write_cell(uint place, Cell cell) {
 }
 
 void main() {
-    uint tile = gl_WorkGroupID.x, thread = gl_LocalInvocationIndex;
+    uint tile = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x, thread = gl_LocalInvocationIndex;
+    if (tile >= tile_count()) {
+        return;
+    }
     if (thread < MOST_WORDS) {
         tile_bits[thread] = 0u;
     }
@@ -126,11 +129,11 @@ void main() {
     }
     barrier();
     by_step = false;
-    visit_surfaces();
+    visit_surfaces(tile);
     barrier();
     if (DIVISION == TILES_25D) {
         by_step = true;
-        visit_surfaces();
+        visit_surfaces(tile);
         barrier();
     }
     if (thread == 0u) {

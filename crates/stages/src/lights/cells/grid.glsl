@@ -38,13 +38,18 @@ uint tiles_across() {
     return (frame.size_px.x + LIGHT_TILE_PX - 1u) / LIGHT_TILE_PX;
 }
 
+// Tiles of the image.
+uint tile_count() {
+    return tiles_across() * ((frame.size_px.y + LIGHT_TILE_PX - 1u) / LIGHT_TILE_PX);
+}
+
 uint tile_of(uvec2 pixel) {
     uvec2 tile = pixel / LIGHT_TILE_PX;
     return tile.y * tiles_across() + tile.x;
 }
 
-// The slice that a view distance lies in; slices have equal ratios or equal steps. Distances outside of all slices belong to the first or
-// the last.
+// The slice that a view distance lies in, which must be a number; slices have equal ratios or equal steps. Distances outside of all slices
+// belong to the first or the last.
 uint slice_of(float distance_m) {
     float nearest_m = frame.distance_range_m.x, farthest_m = frame.distance_range_m.y;
     float share = LOGARITHMIC != 0u ? log2(distance_m / nearest_m) / log2(farthest_m / nearest_m)

@@ -254,7 +254,7 @@ impl<'a> Stage<'a> {
         let cells = pass.write("Cells", cells);
         let words = pass.write("CellWords", words);
         let count = pass.write("CellCount", count);
-        pass.dispatch([self.tiles, 1, 1]);
+        pass.dispatch(self.frame.groups_in_rows(self.tiles));
         pass.finish();
         self.frame.watch(graph, "clusters", &count, self.cell_capacity, false);
         Ok(FoundCells { cells, words, count })

@@ -17,7 +17,7 @@ layout(set = 0, binding = 14, scalar) buffer LightHeads {
 layout(set = 0, binding = 15, scalar) writeonly buffer LightNodes {
     uvec2 light_nodes[];
 };
-layout(set = 0, binding = 16, scalar) coherent buffer LightNodeCount {
+layout(set = 0, binding = 16, scalar) buffer LightNodeCount {
     uint nodes_needed;
     uint nodes_dropped;
 };
@@ -28,8 +28,8 @@ layout(constant_id = 15) const uint SAMPLED = 0u;
 layout(set = 0, binding = 8) uniform texture2D light_lists_depth;
 #endif
 
-// The counter is held at this value once it is full: above every capacity, and so far below 2^32 that the threads that run at once cannot
-// make it wrap around.
+// Counters are held about this value once they reach it: above every capacity, and so far below 2^32 that the threads that run at once
+// cannot make them wrap around. Who finds a counter beyond it takes back what it added, so that nobody reads a counter before.
 const uint MOST_NEEDED = 0xf0000000u;
 
 layout(location = 0) flat in uint light_index;
@@ -74,11 +74,16 @@ bool is_within_range(uint pixel) {
 #endif
 
 void append(uint pixel) {
-    uint node = nodes_needed < MOST_NEEDED ? atomicAdd(nodes_needed, 1u) : MOST_NEEDED;
+    uint node = atomicAdd(nodes_needed, 1u);
     if (node < NODE_CAPACITY) {
         light_nodes[node] = uvec2(light_index, atomicExchange(light_heads[pixel].link, node + 1u));
-    } else if (nodes_dropped < MOST_NEEDED) {
-        atomicAdd(nodes_dropped, 1u);
+        return;
+    }
+    if (node >= MOST_NEEDED) {
+        atomicAdd(nodes_needed, 0xffffffffu);
+    }
+    if (atomicAdd(nodes_dropped, 1u) >= MOST_NEEDED) {
+        atomicAdd(nodes_dropped, 0xffffffffu);
     }
 }
 

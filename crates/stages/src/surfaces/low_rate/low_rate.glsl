@@ -6,7 +6,7 @@
 // What is shared is the irradiance, not the radiance: the material stays at full rate.
 //
 // Two ways to find what shares a sample:
-//   LOW_RATE_QUADS  rate 1/2: the four lanes of a quad ask each other. Where one triangle fills all four pixels, they gather a quarter
+//   LOW_RATE_QUADS  rate 1/2: the four threads of a quad ask each other. Where one triangle fills all four pixels, they gather a quarter
 //                   each, for the mean of their places and normals; else each pixel gathers for itself. Nothing is stored.
 //   else            the shading grid (Ragan-Kelley et al. 2011) with a memoization table: a sample for each triangle of a cell of
 //                   CELL_PX x CELL_PX pixels, at the mean of the pixels that show it. Where all do that is the cell's centre; where
@@ -18,16 +18,17 @@
 
 #ifdef LOW_RATE_QUADS
 #extension GL_KHR_shader_subgroup_basic : require
+#extension GL_KHR_shader_subgroup_vote : require
 #extension GL_KHR_shader_subgroup_quad : require
 
-bool quad_is_whole;     // one triangle fills the four pixels
+uint quad_name;         // the triangle that fills the pixel; NO_TRIANGLE where none does
 
-// Lanes of four pixels that stand together, whatever the subgroup's size.
+// Four threads in a row have four pixels that stand together.
 ivec2 invocation_pixel() {
-    uint lane = gl_SubgroupID * gl_SubgroupSize + gl_SubgroupInvocationID;
-    uint quad = lane / 4u, quads_a_row = gl_WorkGroupSize.x / 2u;
+    uint quad = gl_LocalInvocationIndex / 4u, quads_a_row = gl_WorkGroupSize.x / 2u;
     uvec2 corner = uvec2(quad % quads_a_row, quad / quads_a_row) * 2u;
-    return ivec2(gl_WorkGroupID.xy * gl_WorkGroupSize.xy + corner + uvec2(lane & 1u, lane >> 1 & 1u));
+    uvec2 in_quad = uvec2(gl_LocalInvocationIndex & 1u, gl_LocalInvocationIndex >> 1 & 1u);
+    return ivec2(gl_WorkGroupID.xy * gl_WorkGroupSize.xy + corner + in_quad);
 }
 
 vec3 quad_sum(vec3 v) {
@@ -35,29 +36,41 @@ vec3 quad_sum(vec3 v) {
     return v + subgroupQuadSwapVertical(v);
 }
 
-// Finds out whether the quad shares a sample, of the triangle that each lane has come to. A triangle that fills its pixel is the
-// pixel's first and last, so that where it fills four the lanes are here together; what others swap is not looked at.
+// Keeps the triangle that a pixel has come to, for low_rate_share.
 void low_rate_next(ivec2 pixel, uint name, uint weight) {
     bool quad_inside = all(lessThan(uvec2(pixel | 1), frame.size_px));
-    uint mine = weight == SAMPLES && quad_inside ? name : NO_TRIANGLE;
-    uint same = uint(mine != NO_TRIANGLE && mine == subgroupQuadSwapHorizontal(mine));
-    same &= uint(mine == subgroupQuadSwapVertical(mine));
-    quad_is_whole = (same & subgroupQuadSwapHorizontal(same)) != 0u && mine != NO_TRIANGLE;
+    quad_name = weight == SAMPLES && quad_inside ? name : NO_TRIANGLE;
 }
 
-// Irradiance of a triangle in a pixel. Lanes of whole quads gather a quarter, others all: one loop, so that a subgroup of both
-// takes no longer than the others alone.
-vec3 irradiance_of(ivec2 pixel, uint name, Surface s) {
-    uint first = 0u, end = INDIRECT_SAMPLES;
-    if (quad_is_whole) {
-        s.position_ws = 0.25 * quad_sum(s.position_ws);
-        s.normal_ws = unit_or_zero(quad_sum(s.normal_ws));
+// Whether one triangle fills the four pixels of the quad, which then share a sample. A triangle that fills its pixel is the pixel's first
+// and last, so that where it fills four all four come here with it at once. Vulkan does not say which threads make a quad of a compute
+// shader: where they are not four in a row, nothing is shared.
+bool quad_is_whole(bool found) {
+    uint mine = found ? quad_name : NO_TRIANGLE, thread = gl_LocalInvocationIndex;
+    uint beside = subgroupQuadSwapHorizontal(mine), below = subgroupQuadSwapVertical(mine);
+    bool in_order = subgroupQuadSwapHorizontal(thread) == (thread ^ 1u) && subgroupQuadSwapVertical(thread) == (thread ^ 2u);
+    uint same = uint(in_order && mine != NO_TRIANGLE && mine == beside && mine == below);
+    uint same_beside = subgroupQuadSwapHorizontal(same);
+    return (same & same_beside) != 0u;
+}
+
+// Finds the irradiance of the surface that each thread has come to; those without one only keep the others company. Every thread of the
+// subgroup calls it, so that no thread asks one that is not here. Threads of whole quads gather a quarter, others all: one loop, so that a
+// subgroup of both takes no longer than the others alone.
+void low_rate_share(bool found, Surface s) {
+    bool whole = quad_is_whole(found);
+    vec3 positions_ws = quad_sum(found ? s.position_ws : vec3(0.0)), normals_ws = quad_sum(found ? s.normal_ws : vec3(0.0));
+    uint first = 0u, end = found ? INDIRECT_SAMPLES : 0u;
+    if (whole) {
+        s.position_ws = 0.25 * positions_ws;
+        s.normal_ws = unit_or_zero(normals_ws);
         uint quarter = INDIRECT_SAMPLES / 4u;
         first = (gl_SubgroupInvocationID & 3u) * quarter;
         end = first + quarter;
     }
-    vec3 irradiance = gathered_irradiance(s, first, end);
-    return quad_is_whole ? quad_sum(irradiance) : irradiance;
+    vec3 mine = found ? gathered_irradiance(s, first, end) : vec3(0.0);
+    vec3 of_quad = quad_sum(mine);
+    low_rate_irradiance = whole ? of_quad : mine;
 }
 
 // Nothing is found before.
@@ -185,16 +198,13 @@ void low_rate_fill(ivec2 pixel, bool inside) {
     }
 }
 
-// Nothing to find out.
-void low_rate_next(ivec2 pixel, uint name, uint weight) {}
-
-// Irradiance of a triangle in a pixel.
-vec3 irradiance_of(ivec2 pixel, uint name, Surface s) {
+// Finds the irradiance of the triangle that a pixel has come to.
+void low_rate_next(ivec2 pixel, uint name, uint weight) {
     uint first = cell_first_slot(pixel), probe = first_probe(name);
     while (grid_names[first + probe] != name) {
         probe = (probe + 1u) % SLOTS_A_CELL;
     }
-    return logluv_decode(grid_values[first + probe]);
+    low_rate_irradiance = logluv_decode(grid_values[first + probe]);
 }
 #endif
 

@@ -10,6 +10,12 @@ layout(local_size_x = 8, local_size_y = 8) in;
 
 layout(set = 0, binding = 14, rgba16f) writeonly uniform image2D hdr;
 
+void add_surface(Surface s, uint weight, ivec2 pixel, inout vec3 radiance) {
+    radiance += float(weight) * stepped_radiance(s, uvec2(pixel));
+    ++shaded_count;
+    weight_sum += weight;
+}
+
 void main() {
 #ifdef LOW_RATE
     ivec2 pixel = invocation_pixel();
@@ -25,14 +31,27 @@ void main() {
     uint weight;
     shaded_count = 0u;
     weight_sum = 0u;
+#ifdef LOW_RATE_QUADS
+    if (inside) {
+        source_begin(pixel);
+    }
+    // Threads of a quad ask each other: every thread of the subgroup stays until the last has no surface left.
+    bool found = inside;
+    do {
+        found = found && source_next(s, weight);
+        low_rate_share(found, s);
+        if (found) {
+            add_surface(s, weight, pixel, radiance);
+        }
+    } while (subgroupAny(found));
+#else
     if (inside) {
         source_begin(pixel);
         while (source_next(s, weight)) {
-            radiance += float(weight) * stepped_radiance(s, uvec2(pixel));
-            ++shaded_count;
-            weight_sum += weight;
+            add_surface(s, weight, pixel, radiance);
         }
     }
+#endif
     if (inside) {
         imageStore(hdr, pixel, vec4(resolved(radiance), 1.0));
     }

@@ -16,16 +16,12 @@ Surface surface_of_triangle(uint place, vec2 pixel) {
 
 bool source_next(out Surface s, out uint weight) {
     uint name;
-    bool found = source_next_triangle(name, weight);
-#ifdef LOW_RATE
-    low_rate_next(source_pixel, name, weight);
-#endif
-    if (!found) {
+    if (!source_next_triangle(name, weight)) {
         return false;
     }
     s = surface_of_triangle(source_place(name), vec2(source_pixel));
 #ifdef LOW_RATE
-    low_rate_irradiance = irradiance_of(source_pixel, name, s);
+    low_rate_next(source_pixel, name, weight);
 #endif
     return true;
 }
