@@ -3,8 +3,9 @@
 
 mod common;
 
-use std::sync::Arc;
+use std::{collections::BTreeSet, sync::Arc};
 
+use afterlight_image::Rgba8Image;
 use afterlight_renderer::Renderer;
 use afterlight_stages::surfaces::compute_raster;
 use afterlight_techniques::{
@@ -20,7 +21,7 @@ use afterlight_techniques::{
     set_param,
     shader::Shader,
 };
-use common::{Stage, compiled_with_header, image_of, psnr};
+use common::{Stage, compiled_with_header, image_of, params, psnr};
 use glam::{Affine3A, DVec2, DVec3, DVec4, Vec3};
 
 /// Half of the spacing of floats at 1.
@@ -312,10 +313,12 @@ const RASTER: &str = "surfaces/compute_raster/raster.glsl";
 
 /// Vertices far out of the image are moved to its guard band, x and y apart, instead of clipping edges to it.
 fn clamped() -> Vec<Shader> {
-    let within = "return clip.z <= clip.w && all(lessThanEqual(abs(clip.xy) * vec2(frame.size_px), vec2(2.0 * GUARD_BAND_PX * clip.w)));";
     mutants(
         RASTER,
-        &[(within, "return clip.z <= clip.w;"), ("round(px * ", "round(clamp(px, -2.0e6, 2.0e6) * ")],
+        &[
+            ("GUARD_BAND_PX = 32768.0", "GUARD_BAND_PX = 1.0e30"),
+            ("round(px * ", "round(clamp(px, -2.0e6, 2.0e6) * "),
+        ],
     )
 }
 
@@ -369,8 +372,8 @@ fn floor() -> [Triangle; 2] {
 }
 
 /// A triangle of any shape around a point that shows: of a thousandth of a pixel to far larger than the image, slivers, edges along the line
-/// of sight, and vertices behind the eye.
-fn random_triangle(rng: &mut SplitMix64, camera: &Camera, aspect: f32) -> Triangle {
+/// of sight, and vertices behind the eye where its size may reach more than its distance.
+fn random_triangle(rng: &mut SplitMix64, camera: &Camera, aspect: f32, reach: f32) -> Triangle {
     let view_from_world = camera.view_from_world();
     let world_from_view = view_from_world.inverse();
     let Projection::Perspective { fov_y_rad, near_m } = camera.projection else {
@@ -379,7 +382,7 @@ fn random_triangle(rng: &mut SplitMix64, camera: &Camera, aspect: f32) -> Triang
     let half = (0.5 * fov_y_rad).tan();
     let ray = Vec3::new((2.0 * unit(rng) - 1.0) * half * aspect, (2.0 * unit(rng) - 1.0) * half, -1.0);
     let distance_m = log_between(rng, 1.1 * near_m, 300.0);
-    let size_m = distance_m * log_between(rng, 1e-3, 300.0);
+    let size_m = distance_m * log_between(rng, 0.02, reach);
     let mut edges = [direction(rng), direction(rng)];
     match rng.next_u64() % 4 {
         0 => edges[1] = edges[0] + edges[1] * log_between(rng, 1e-4, 1e-1),
@@ -400,44 +403,151 @@ fn random_camera(rng: &mut SplitMix64) -> Camera {
     camera(eye, direction(rng), fov, log_between(rng, 2e-4, 0.5))
 }
 
+/// A view of random triangles: few at a time, so that most of them stay in sight.
+fn random_view(seed: u64) -> (View, Vec<Triangle>) {
+    let mut rng = SplitMix64::new(seed);
+    let mut view = View::new(random_camera(&mut rng), (61, 43), if seed % 2 == 0 { 1 } else { 4 });
+    view.small_px = [16, 64, 1][seed as usize % 3];
+    let reach = [1.0, 10.0, 1000.0][seed as usize / 2 % 3];
+    let triangles = (0..16).map(|_| random_triangle(&mut rng, &view.camera, 61.0 / 43.0, reach)).collect();
+    (view, triangles)
+}
+
 #[test]
 fn random_triangles_are_those_of_f64() {
     let gpu = afterlight_testkit::gpu();
-    let (mut covered, mut partly) = (0, 0);
-    for seed in 0..24 {
-        let mut rng = SplitMix64::new(seed);
-        let mut view = View::new(random_camera(&mut rng), (61, 43), if seed % 2 == 0 { 1 } else { 4 });
-        view.small_px = [16, 64, 1][seed as usize % 3];
-        // Few at a time: most of them stay in sight.
-        let triangles: Vec<Triangle> =
-            (0..40).map(|_| random_triangle(&mut rng, &view.camera, 61.0 / 43.0)).collect();
-        let (wrong, sure) = judge(&view, &triangles, &view.on_device(&gpu, &triangles, &[]));
-        println!("seed {seed}: {sure} samples surely covered, {wrong:?}");
+    let (mut covered, mut partly, mut seen) = (0, 0, 0);
+    for seed in 0..36 {
+        let (view, triangles) = random_view(seed);
+        let shown = view.on_device(&gpu, &triangles, &[]);
+        let (wrong, sure) = judge(&view, &triangles, &shown);
+        let differ: BTreeSet<usize> = shown.iter().flatten().map(|s| s.triangle).collect();
+        println!("seed {seed}: {sure} samples surely covered, {} triangles seen, {wrong:?}", differ.len());
         assert_eq!(wrong, Wrong::default(), "seed {seed}");
         covered += sure;
-        partly += triangles.iter().filter(|t| !Exact::new(&view, t).is_within).count();
+        seen += differ.len();
+        partly += differ.iter().filter(|i| !Exact::new(&view, &triangles[**i]).is_within).count();
     }
-    assert!(
-        covered > 50_000 && partly > 100,
-        "{covered} samples, {partly} triangles to clip: too few to tell"
-    );
+    println!("{covered} samples, {seen} triangles seen, {partly} of them clipped");
+    assert!(covered > 50_000 && partly > 30 && seen > 100, "too few to tell");
 }
 
-/// Wholly before the near plane, wholly behind it and within the guard band, depth does not depend on more than the snapped vertices.
+/// A triangle given by what the rasteriser makes of it: vertices in 1/256 pixel, and depths.
+struct Snapped {
+    at: [[i64; 2]; 3],
+    depth: [f64; 3],
+}
+
+impl Snapped {
+    /// Within 4,000 pixels of the image, so that floats put every vertex next to the point of the grid that is meant. Depths differ by up to
+    /// ten thousand times.
+    fn random(rng: &mut SplitMix64, size_px: (u32, u32)) -> Self {
+        let reach = log_between(rng, 4.0, 4000.0);
+        let mut point = || {
+            [size_px.0, size_px.1]
+                .map(|size| (256.0 * (0.5 * size as f32 + reach * (2.0 * unit(rng) - 1.0))) as i64)
+        };
+        let mut at = [point(), point(), point()];
+        if rng.next_u64() % 2 == 0 {
+            // A sliver, up to some hundredths of a pixel high.
+            let t = f64::from(unit(rng));
+            for k in 0..2 {
+                let along = at[0][k] as f64 + t * (at[1][k] - at[0][k]) as f64;
+                at[2][k] = along as i64 + (rng.next_u64() % 32) as i64 - 16;
+            }
+        }
+        Self { at, depth: [(); 3].map(|()| f64::from(log_between(rng, 1e-4, 0.9) as f32)) }
+    }
+
+    /// The triangle in the world of a camera in the origin that looks along -Z, and the depths that its vertices have in floats.
+    fn in_world(&mut self, view: &View) -> Triangle {
+        let m = view.camera.clip_from_view(view.size_px.0 as f32 / view.size_px.1 as f32).as_dmat4();
+        let Projection::Perspective { near_m, .. } = view.camera.projection else {
+            panic!("a perspective camera")
+        };
+        let vertex = |i: usize| {
+            let w_m = f64::from((f64::from(near_m) / self.depth[i]) as f32);
+            let ndc =
+                DVec2::new(self.at[i][0] as f64, self.at[i][1] as f64) / 256.0 * 2.0 / view.size() - 1.0;
+            DVec3::new(ndc.x * w_m / m.x_axis.x, ndc.y * w_m / m.y_axis.y, -w_m).as_vec3()
+        };
+        let triangle = [vertex(0), vertex(1), vertex(2)];
+        self.depth = triangle.map(|p| f64::from(near_m) / -f64::from(p.z));
+        triangle
+    }
+
+    /// The least of the edge functions at a place in 1/256 pixel, and depth there.
+    fn at(&self, place: [i64; 2]) -> Option<(i64, f64)> {
+        let cross = |o: [i64; 2], a: [i64; 2], b: [i64; 2]| {
+            (a[0] - o[0]) * (b[1] - o[1]) - (a[1] - o[1]) * (b[0] - o[0])
+        };
+        let [a, b, c] = self.at;
+        let area = cross(a, b, c);
+        let edges = [cross(place, b, c), cross(place, c, a), cross(place, a, b)].map(|e| e * area.signum());
+        let depth = (0..3).map(|i| edges[i] as f64 * self.depth[i]).sum::<f64>() / area.abs() as f64;
+        (area != 0).then(|| (edges[0].min(edges[1]).min(edges[2]), depth))
+    }
+}
+
+/// Compares triangles of known snapped vertices with integers, and returns samples that show a triangle which does not cover them, or miss
+/// one, samples whose depth is off, and all that show a triangle.
+fn judge_snapped(device: &gpu::Device, seed: u64, shaders: &[Shader]) -> (usize, usize, usize) {
+    let mut rng = SplitMix64::new(seed);
+    let size_px = (64, 48);
+    let mut view =
+        View::new(camera(Vec3::ZERO, Vec3::NEG_Z, 0.9, 0.01), size_px, if seed % 2 == 0 { 1 } else { 4 });
+    view.small_px = [16, 64, 1][seed as usize % 3];
+    let mut snapped: Vec<Snapped> = (0..24).map(|_| Snapped::random(&mut rng, size_px)).collect();
+    let triangles: Vec<Triangle> = snapped.iter_mut().map(|t| t.in_world(&view)).collect();
+    let (mut elsewhere, mut off, mut all) = (0, 0, 0);
+    for (index, shown) in view.on_device(device, &triangles, shaders).into_iter().enumerate() {
+        let place = (view.place_px(index) * 256.0).to_array().map(|p| p as i64);
+        let inside = snapped.iter().filter_map(|t| t.at(place)).filter(|(least, _)| *least > 0);
+        let nearest = inside.map(|(_, depth)| depth).fold(0.0, f64::max);
+        let depth = shown.map_or(0.0, |s| s.depth);
+        elsewhere += usize::from(depth < nearest * (1.0 - DEPTH_ERROR));
+        if let Some(shown) = shown {
+            let (least, exact) = snapped[shown.triangle].at(place).unwrap_or((-1, 0.0));
+            elsewhere += usize::from(least < 0);
+            off += usize::from((depth - exact).abs() > DEPTH_ERROR * exact);
+            all += 1;
+        }
+    }
+    (elsewhere, off, all)
+}
+
+/// From the snapped vertices on, coverage is exact and depth has a relative error, of slivers as well.
+#[test]
+fn snapped_triangles_are_those_of_integers() {
+    let gpu = afterlight_testkit::gpu();
+    let mut samples = 0;
+    for seed in 0..24 {
+        let (elsewhere, off, all) = judge_snapped(&gpu, seed, &[]);
+        println!("seed {seed}: {all} samples, {elsewhere} elsewhere, {off} depths off");
+        assert_eq!((elsewhere, off), (0, 0), "seed {seed}");
+        samples += all;
+    }
+    assert!(samples > 50_000, "{samples} samples: too few to tell");
+}
+
 #[test]
 fn a_floor_from_its_middle_is_that_of_f64() {
     let gpu = afterlight_testkit::gpu();
-    for (size_px, samples) in [((1920, 1080), 1), ((131, 77), 4)] {
-        for towards in [Vec3::new(0.3, -0.1, 1.0), Vec3::new(0.0, -1.0, 0.01), Vec3::new(1.0, -0.4, 0.0)] {
-            let view = View::new(camera(Vec3::Y * 1.7, towards, 1.0, 0.004), size_px, samples);
-            let (wrong, covered) = judge(&view, &floor(), &view.on_device(&gpu, &floor(), &[]));
-            println!("{size_px:?}, {samples} samples, towards {towards}: {covered} covered, {wrong:?}");
-            assert!(
-                covered > (size_px.0 * size_px.1 * samples / 3) as usize,
-                "{covered} samples of the floor"
-            );
-            assert_eq!(wrong, Wrong::default(), "{size_px:?}, {samples} samples, towards {towards}");
-        }
+    let (ahead, down, aside) =
+        (Vec3::new(0.3, -0.1, 1.0), Vec3::new(0.0, -1.0, 0.01), Vec3::new(1.0, -0.4, 0.0));
+    for (size_px, samples, towards) in [
+        ((1920, 1080), 1, ahead),
+        ((480, 270), 1, down),
+        ((480, 270), 1, aside),
+        ((131, 77), 4, ahead),
+        ((131, 77), 4, down),
+        ((131, 77), 4, aside),
+    ] {
+        let view = View::new(camera(Vec3::Y * 1.7, towards, 1.0, 0.004), size_px, samples);
+        let (wrong, covered) = judge(&view, &floor(), &view.on_device(&gpu, &floor(), &[]));
+        println!("{size_px:?}, {samples} samples, towards {towards}: {covered} covered, {wrong:?}");
+        assert!(covered > (size_px.0 * size_px.1 * samples / 3) as usize, "{covered} samples of the floor");
+        assert_eq!(wrong, Wrong::default(), "{size_px:?}, {samples} samples, towards {towards}");
     }
 }
 
@@ -493,15 +603,110 @@ fn triangles_of_a_fan_share_no_sample_and_leave_none_out() {
     }
 }
 
+/// Vertices that are clamped leave a part of the floor uncovered; planes in floats give wrong depths of slivers and of triangles seen
+/// edge-on.
 #[test]
 fn mutants_are_caught() {
     let gpu = afterlight_testkit::gpu();
-    let view = View::new(camera(Vec3::Y * 1.7, Vec3::new(0.3, -0.1, 1.0), 1.0, 0.004), (480, 270), 1);
-    for (what, shaders) in [("clamped", clamped()), ("planes", planes())] {
-        let (wrong, covered) = judge(&view, &floor(), &view.on_device(&gpu, &floor(), &shaders));
-        println!("{what}: {wrong:?} of {covered}");
-        assert!(wrong.count() * 100 > covered, "{what}: a mutant goes unseen: {wrong:?} of {covered}");
+    let view = View::new(camera(Vec3::Y * 1.7, Vec3::new(0.3, -0.6, 1.0), 1.0, 0.0002), (480, 270), 1);
+    let judged = |shaders: &[Shader]| judge(&view, &floor(), &view.on_device(&gpu, &floor(), shaders));
+    let (right, covered) = judged(&[]);
+    assert_eq!(right, Wrong::default());
+    let (wrong, _) = judged(&clamped());
+    println!("clamped: {wrong:?} of {covered}");
+    assert!(wrong.missed * 50 > covered, "clamped vertices go unseen: {wrong:?} of {covered}");
+
+    let planes = planes();
+    let off: usize = (0..16).map(|seed| judge_snapped(&gpu, seed, &planes).1).sum();
+    println!("planes: {off} depths off");
+    assert!(off > 20, "planes in floats go unseen: {off} depths off");
+}
+
+/// `gbuffer-list` with its triangles found in one way or the other, and with shaders in place of its own.
+fn list_image(stage: &Stage, settings: &Settings, sets: &[(&str, &str)], shaders: &[Shader]) -> Rgba8Image {
+    let list = find("gbuffer-list").expect("known");
+    image_of(&mut stage.prepare_shaders(list, settings, &params(list, sets), shaders.iter().cloned()))
+}
+
+/// Rasterisation in compute finds what the raster pass finds: triangles before the near plane, near planes that all triangles under the eye
+/// reach far out of the image for, triangles of every size, and more of them than the first frame has room for.
+#[test]
+fn compute_rasterisation_finds_what_the_raster_pass_finds() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=17000&texture=64");
+    let bounds = stage.scene.bounds_ws();
+    let floor_m = bounds.center() - Vec3::Y * (0.499 * bounds.size().y);
+    let views = [
+        ("in a wall", bounds.min + bounds.size() * Vec3::new(0.5, 0.3, 0.002), bounds.center(), 0.05),
+        ("on the floor", floor_m, bounds.center(), 0.05),
+        ("on the floor, near plane at a millimetre", floor_m, bounds.center(), 0.001),
+        ("straight down", bounds.center(), bounds.center() - Vec3::Y, 0.05),
+        ("far outside", bounds.center() + bounds.size() * 50.0, bounds.center(), 0.05),
+    ];
+    for samples in [1, 4] {
+        for (what, eye, target, near_m) in views {
+            let camera = Camera::look_at(what, eye, target, 1.0, near_m);
+            let settings = Settings { samples, ..stage.from(camera, (131, 77), 20) };
+            let raster = list_image(&stage, &settings, &[("visibility", "raster")], &[]);
+            // Every triangle in tiles takes long on a CPU: one view shows it.
+            let sizes: &[&str] = if what == "straight down" { &["1", "16", "64"] } else { &["16"] };
+            for small_px in sizes {
+                let sets = [("visibility", "compute"), ("small-px", *small_px)];
+                let db = psnr(&raster, &list_image(&stage, &settings, &sets, &[]));
+                println!("{samples} samples, {what}, small-px={small_px}: {db:.2} dB");
+                assert!(
+                    db >= min_psnr_db(samples),
+                    "{samples} samples, {what}, small-px={small_px}: {db:.2} dB to the raster pass"
+                );
+            }
+        }
     }
+}
+
+/// A floor of two triangles under the eye, and far from it: the raster pass's, and not with vertices that are clamped.
+#[test]
+fn a_floor_of_two_triangles_is_the_raster_passs() {
+    let gpu = afterlight_testkit::gpu();
+    for (towards, near_m) in [
+        (Vec3::new(0.3, -0.6, 1.0), 0.0002),
+        (Vec3::new(0.3, -0.1, 1.0), 0.004),
+        (Vec3::new(-1.0, -0.05, 0.1), 0.05),
+    ] {
+        let camera = camera(Vec3::Y * 1.7, towards, 1.0, near_m);
+        let stage = Stage::of(&gpu, scene_of(&floor(), &camera, true));
+        for samples in [1, 4] {
+            let settings = Settings { samples, ..stage.from(camera.clone(), (480, 270), 20) };
+            let raster = list_image(&stage, &settings, &[("visibility", "raster")], &[]);
+            let compute =
+                |shaders: &[Shader]| list_image(&stage, &settings, &[("visibility", "compute")], shaders);
+            let db = psnr(&raster, &compute(&[]));
+            println!("towards {towards}, near plane at {near_m} m, {samples} samples: {db:.2} dB");
+            assert!(
+                db >= min_psnr_db(samples),
+                "towards {towards}, {near_m} m, {samples} samples: {db:.2} dB"
+            );
+            if near_m < 0.001 {
+                let db = psnr(&raster, &compute(&clamped()));
+                println!("clamped: {db:.2} dB");
+                assert!(db < 35.0, "clamped vertices go unseen: {db:.2} dB");
+            }
+        }
+    }
+}
+
+/// A camera off by two centimetres moves edges by a part of a pixel: the comparisons above must see it.
+#[test]
+fn a_camera_off_by_two_centimetres_is_caught() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=17000&texture=64");
+    let from = |eye: Vec3| {
+        let camera = Camera::look_at("view", eye, eye + Vec3::new(1.0, -0.1, 0.2), 1.0, 0.05);
+        let settings = Settings { samples: 4, ..stage.from(camera, (131, 77), 20) };
+        list_image(&stage, &settings, &[("visibility", "compute")], &[])
+    };
+    let eye = stage.scene.bounds_ws().center();
+    let db = psnr(&from(eye), &from(eye + Vec3::Y * 0.02));
+    assert!(db < 40.0, "a mutant within the bound: {db:.2} dB");
 }
 
 /// Every technique that can rasterise in compute, made to.

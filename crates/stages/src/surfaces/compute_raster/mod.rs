@@ -1,8 +1,8 @@
 //! The stage that rasterises the scene in compute, every sample of a pixel: a 64-bit key a sample, depth above the triangle.
 //!
 //! For devices whose raster part is small beside their arithmetic. Small triangles take a thread each; large ones, and those
-//! that cross the near plane or reach far out of the image, are listed, cut into tiles and rasterised a group a tile. The lists' capacities are counted: a
-//! frame that needs more is recorded again.
+//! that cross the near plane or reach far out of the image, are listed, clipped, cut into tiles and rasterised a group a tile.
+//! The lists' capacities are counted: a frame that needs more is recorded again.
 
 use afterlight_graph::{BufferHandle, BufferRole, Graph, PassRole};
 

@@ -1,8 +1,10 @@
 // Rasterisation in compute: coverage of every sample by Vulkan's rules, the nearest surface kept by a 64-bit maximum.
 //
 // Vertices are snapped to 1/256 pixel, edge functions are exact integers, ties follow the top-left rule: triangles that share
-// an edge neither overlap nor leave a gap. EDGE is the type of edge functions that the shader has. A sample's key is its depth (reversed, so the greatest is nearest) above the
+// an edge neither overlap nor leave a gap. A sample's key is its depth (reversed, so the greatest is nearest) above the
 // complement of the triangle's place in the order of draws: of equal depths the first drawn wins, as in a raster pass.
+//
+// EDGE: the type of the edge functions that the shader has, int64_t if it does not say.
 #ifndef AFTERLIGHT_RASTER
 #define AFTERLIGHT_RASTER
 #extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
