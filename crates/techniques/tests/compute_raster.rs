@@ -269,12 +269,6 @@ struct Wrong {
     missed: usize,
 }
 
-impl Wrong {
-    fn count(&self) -> usize {
-        self.outside + self.depth + self.missed
-    }
-}
-
 /// Compares every sample with every triangle in f64. Also returns how many samples surely show a triangle.
 fn judge(view: &View, triangles: &[Triangle], shown: &[Option<Shown>]) -> (Wrong, usize) {
     let exact: Vec<Exact> = triangles.iter().map(|t| Exact::new(view, t)).collect();
