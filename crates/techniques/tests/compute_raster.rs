@@ -275,11 +275,11 @@ fn judge(view: &View, triangles: &[Triangle], shown: &[Option<Shown>]) -> (Wrong
     let (mut wrong, mut covered) = (Wrong::default(), 0);
     for (index, shown) in shown.iter().enumerate() {
         let place = view.place_px(index);
-        if let Some(shown) = shown {
-            if let Some(judged) = exact[shown.triangle].judged(view, place) {
-                wrong.outside += usize::from(judged.inside_px < -judged.inside_off_px);
-                wrong.depth += usize::from((shown.depth - judged.depth).abs() > judged.depth_off);
-            }
+        if let Some(shown) = shown
+            && let Some(judged) = exact[shown.triangle].judged(view, place)
+        {
+            wrong.outside += usize::from(judged.inside_px < -judged.inside_off_px);
+            wrong.depth += usize::from((shown.depth - judged.depth).abs() > judged.depth_off);
         }
         let must_be_nearer = |t: &Exact| {
             let near = Exact::at(&t.clip, view.size(), place)?;
@@ -400,7 +400,7 @@ fn random_camera(rng: &mut SplitMix64) -> Camera {
 /// A view of random triangles: few at a time, so that most of them stay in sight.
 fn random_view(seed: u64) -> (View, Vec<Triangle>) {
     let mut rng = SplitMix64::new(seed);
-    let mut view = View::new(random_camera(&mut rng), (61, 43), if seed % 2 == 0 { 1 } else { 4 });
+    let mut view = View::new(random_camera(&mut rng), (61, 43), if seed.is_multiple_of(2) { 1 } else { 4 });
     view.small_px = [16, 64, 1][seed as usize % 3];
     let reach = [1.0, 10.0, 1000.0][seed as usize / 2 % 3];
     let triangles = (0..16).map(|_| random_triangle(&mut rng, &view.camera, 61.0 / 43.0, reach)).collect();
@@ -442,15 +442,16 @@ impl Snapped {
                 .map(|size| (256.0 * (0.5 * size as f32 + reach * (2.0 * unit(rng) - 1.0))) as i64)
         };
         let mut at = [point(), point(), point()];
-        if rng.next_u64() % 2 == 0 {
+        if rng.next_u64().is_multiple_of(2) {
             // A sliver, up to some hundredths of a pixel high.
             let t = f64::from(unit(rng));
-            for k in 0..2 {
-                let along = at[0][k] as f64 + t * (at[1][k] - at[0][k]) as f64;
-                at[2][k] = along as i64 + (rng.next_u64() % 32) as i64 - 16;
-            }
+            let [a, b, _] = at;
+            at[2] = [0, 1].map(|k| {
+                let along = a[k] as f64 + t * (b[k] - a[k]) as f64;
+                along as i64 + (rng.next_u64() % 32) as i64 - 16
+            });
         }
-        Self { at, depth: [(); 3].map(|()| f64::from(log_between(rng, 1e-4, 0.9) as f32)) }
+        Self { at, depth: [(); 3].map(|()| f64::from(log_between(rng, 1e-4, 0.9))) }
     }
 
     /// The triangle in the world of a camera in the origin that looks along -Z, and the depths that its vertices have in floats.
@@ -488,8 +489,11 @@ impl Snapped {
 fn judge_snapped(device: &gpu::Device, seed: u64, shaders: &[Shader]) -> (usize, usize, usize) {
     let mut rng = SplitMix64::new(seed);
     let size_px = (64, 48);
-    let mut view =
-        View::new(camera(Vec3::ZERO, Vec3::NEG_Z, 0.9, 0.01), size_px, if seed % 2 == 0 { 1 } else { 4 });
+    let mut view = View::new(
+        camera(Vec3::ZERO, Vec3::NEG_Z, 0.9, 0.01),
+        size_px,
+        if seed.is_multiple_of(2) { 1 } else { 4 },
+    );
     view.small_px = [16, 64, 1][seed as usize % 3];
     let mut snapped: Vec<Snapped> = (0..24).map(|_| Snapped::random(&mut rng, size_px)).collect();
     let triangles: Vec<Triangle> = snapped.iter_mut().map(|t| t.in_world(&view)).collect();
@@ -552,7 +556,7 @@ fn triangles_of_a_fan_share_no_sample_and_leave_none_out() {
     const COUNT: usize = 7;
     for seed in 0..8 {
         let mut rng = SplitMix64::new(100 + seed);
-        let samples = if seed % 2 == 0 { 1 } else { 4 };
+        let samples = if seed.is_multiple_of(2) { 1 } else { 4 };
         // Seen from above, so that the fan's front shows.
         let down = Vec3::new(unit(&mut rng) - 0.5, -0.2 - unit(&mut rng), unit(&mut rng) - 0.5);
         let near_m = log_between(&mut rng, 1e-4, 0.2);
