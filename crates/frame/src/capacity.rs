@@ -54,6 +54,8 @@ pub fn most(before: Vec<Counter>, last: Vec<Counter>) -> Vec<Counter> {
 pub struct Demand {
     name: &'static str,
     resource: ResourceId,
+    /// Of the two, in the resource.
+    first_word: usize,
     capacity: u32,
     fixed: bool,
     slack_eighths: u32,
@@ -64,6 +66,7 @@ impl Demand {
     pub fn read(&self, executor: &Executor) -> Result<Counter, TechniqueError> {
         let bytes = executor.read_buffer(self.resource)?;
         let word = |i: usize| {
+            let i = self.first_word + i;
             bytes.get(4 * i..4 * i + 4).map_or(0, |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]))
         };
         Ok(self.counted(word(0), word(1)))
@@ -160,8 +163,23 @@ impl Frame<'_> {
         slack_eighths: u32,
     ) {
         let resource = graph.keep(counter);
-        let demand = Demand { name, resource, capacity, fixed, slack_eighths };
+        let demand = Demand { name, resource, first_word: 0, capacity, fixed, slack_eighths };
         self.capacities.demands.borrow_mut().push(demand);
+    }
+
+    /// As [`Self::watch`] without a fixed bound, of several counters that stand in one buffer, two words each: one clear serves all, and
+    /// on a GPU a clear costs as much for 8 bytes as for 8,000.
+    pub fn watch_all(&self, graph: &mut Graph, counters: &BufferHandle, of: &[(&'static str, u32)]) {
+        let resource = graph.keep(counters);
+        let demand = |(i, (name, capacity)): (usize, &(&'static str, u32))| Demand {
+            name,
+            resource,
+            first_word: 2 * i,
+            capacity: *capacity,
+            fixed: false,
+            slack_eighths: STEADY,
+        };
+        self.capacities.demands.borrow_mut().extend(of.iter().enumerate().map(demand));
     }
 }
 
@@ -192,8 +210,14 @@ mod tests {
     fn what_was_given_room_settles() {
         for slack_eighths in [STEADY, UNSTEADY] {
             for needed in [0, 1, 5_000, 133_822, 1 << 24] {
-                let demand =
-                    Demand { name: "blocks", resource: kept(), capacity: 0, fixed: false, slack_eighths };
+                let demand = Demand {
+                    name: "blocks",
+                    resource: kept(),
+                    first_word: 0,
+                    capacity: 0,
+                    fixed: false,
+                    slack_eighths,
+                };
                 let first = Capacities { known: Vec::new(), demands: RefCell::new(vec![demand]) };
                 let room = match first.next(&[counter(needed, needed.saturating_sub(1), false)]) {
                     Some(next) => next.known[0].1,

@@ -1,6 +1,6 @@
 // Rasterises the tiles of large triangles: a group takes a job at a time, 8x8 pixels of it at once.
 //
-// In: TileJobs, JobCount. Out: SampleKeys. Dispatch: any number of groups.
+// In: TileJobs, QueueCounts, ClippedTriangles. Out: SampleKeys. Dispatch: any number of groups.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "surfaces/compute_raster/raster.glsl"
@@ -10,9 +10,10 @@ layout(local_size_x = 8, local_size_y = 8) in;
 layout(set = 0, binding = 10, scalar) readonly buffer TileJobs {
     uvec2 tile_jobs[];
 };
-layout(set = 0, binding = 11, scalar) readonly buffer JobCount {
-    uint jobs_needed;
-    uint jobs_dropped;
+#define QUEUE_ACCESS readonly
+#include "surfaces/compute_raster/queue_counts.glsl"
+layout(set = 0, binding = 15, scalar) readonly buffer ClippedTriangles {
+    ClippedTriangle clipped_triangles[];
 };
 layout(constant_id = 11) const uint JOB_CAPACITY = 0u;
 
@@ -22,15 +23,19 @@ void main() {
     uint count = min(jobs_needed, JOB_CAPACITY);
     for (uint place = gl_WorkGroupID.x; place < count; place += gl_NumWorkGroups.x) {
         uvec2 job = tile_jobs[place];
-        uint order = job.x;
+        bool is_clipped = (job.y & CLIPPED_JOB) != 0u;
+        uint order = is_clipped ? clipped_triangles[job.x].order : job.x;
         RasterDraw d = load_raster_draw(order >> TRIANGLE_BITS);
-        vec4 c0, c1, c2;
-        vertices_clip(d.data, triangle_vertices(order & ((1u << TRIANGLE_BITS) - 1u), d.data), c0, c1, c2);
         ScreenTriangle t;
-        if (!screen_triangle(d, c0, c1, c2, job.y >> 31, t)) {
-            continue;
+        if (is_clipped) {
+            t = clipped_triangles[job.x].triangle;
+        } else {
+            vec4 c0, c1, c2;
+            vertices_clip(d.data, triangle_vertices(order & ((1u << TRIANGLE_BITS) - 1u), d.data), c0, c1, c2);
+            if (!screen_triangle(d, c0, c1, c2, t)) {
+                continue;
+            }
         }
-        DepthPlane plane = depth_plane(t);
         Edge e0 = edge_between(t.p0, t.p1), e1 = edge_between(t.p1, t.p2), e2 = edge_between(t.p2, t.p0);
         ivec2 tile = ivec2(job.y & 0xffffu, job.y >> 16 & 0x7fffu) * TILE_PX;
         for (int block = 0; block < (TILE_PX / BLOCK_PX) * (TILE_PX / BLOCK_PX); ++block) {
@@ -44,14 +49,13 @@ void main() {
                     a2 = edge_at(e2, pixel * SUBPIXELS);
             uint covered = 0u;
             for (uint i = 0u; i < SAMPLES; ++i) {
-                ivec2 s = ivec2(sample_location(i) * float(SUBPIXELS));
-                bool inside = a0 + int64_t(e0.d.x) * s.y - int64_t(e0.d.y) * s.x >= 0L
-                    && a1 + int64_t(e1.d.x) * s.y - int64_t(e1.d.y) * s.x >= 0L
-                    && a2 + int64_t(e2.d.x) * s.y - int64_t(e2.d.y) * s.x >= 0L;
+                ivec2 s = sample_subpixels(i);
+                bool inside = edge_at_sample(a0, e0.d, s) >= int64_t(e0.least) && edge_at_sample(a1, e1.d, s) >= int64_t(e1.least)
+                    && edge_at_sample(a2, e2.d, s) >= int64_t(e2.least);
                 covered |= inside ? 1u << i : 0u;
             }
             if (covered != 0u) {
-                keep_nearest(pixel, covered, t, plane, order, d);
+                keep_nearest(pixel, covered, t, DepthEdges(a2, a0, e2.d, e0.d), order, d);
             }
         }
     }

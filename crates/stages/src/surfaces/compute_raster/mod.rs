@@ -1,8 +1,8 @@
 //! The stage that rasterises the scene in compute, every sample of a pixel: a 64-bit key a sample, depth above the triangle.
 //!
 //! For devices whose raster part is small beside their arithmetic. Small triangles take a thread each; large ones, and those
-//! that cross the near plane, are listed, cut into tiles and rasterised a group a tile. The lists' capacities are counted: a
-//! frame that needs more is recorded again.
+//! that cross the near plane or reach far out of the image, are listed, clipped, cut into tiles and rasterised a group a tile.
+//! The lists' capacities are counted: a frame that needs more is recorded again.
 
 use afterlight_graph::{BufferHandle, BufferRole, Graph, PassRole};
 
@@ -19,6 +19,10 @@ pub use params::{ComputeRasterParams, Visibility};
 const FIRST_LARGE: u32 = 1 << 16;
 /// Tiles of large triangles that the first frame has room for.
 const FIRST_JOBS: u32 = 1 << 18;
+/// Parts of clipped triangles that the first frame has room for: few triangles of a scene stand that close to the eye.
+const FIRST_CLIPPED: u32 = 1 << 12;
+/// Bytes of such a part: `ClippedTriangle` in `tile_jobs.glsl`.
+const CLIPPED_BYTES: u64 = 40;
 /// Groups that share the lists of large triangles; enough to fill any device.
 const LIST_GROUPS: u32 = 4096;
 
@@ -69,16 +73,20 @@ pub fn rasterize(
     frame.check_binding(technique, &format!("a key for each of {samples} samples of every pixel"), bytes)?;
     let large_capacity = frame.capacity("large_triangles", FIRST_LARGE);
     let job_capacity = frame.capacity("tile_jobs", FIRST_JOBS);
+    let clipped_capacity = frame.capacity("clipped_triangles", FIRST_CLIPPED);
     let name = |stage: &str| format!("{technique}/{stage}");
     let keys = graph.buffer(&name("sample keys"), BufferRole::SampleKeys, bytes);
     let large =
         graph.buffer(&name("large triangles"), BufferRole::RasterQueues, 4 * u64::from(large_capacity));
     let jobs = graph.buffer(&name("tile jobs"), BufferRole::RasterQueues, 8 * u64::from(job_capacity));
-    let large_count = graph.buffer(&name("large count"), BufferRole::RasterQueues, 8);
-    let job_count = graph.buffer(&name("job count"), BufferRole::RasterQueues, 8);
+    let clipped = graph.buffer(
+        &name("clipped triangles"),
+        BufferRole::RasterQueues,
+        CLIPPED_BYTES * u64::from(clipped_capacity),
+    );
+    let counts = graph.buffer(&name("queue counts"), BufferRole::RasterQueues, 24);
     let keys = graph.clear_buffer(&name("clear keys"), PassRole::Geometry, keys, 0);
-    let large_count = graph.clear_buffer(&name("clear large count"), PassRole::Geometry, large_count, 0);
-    let job_count = graph.clear_buffer(&name("clear job count"), PassRole::Geometry, job_count, 0);
+    let counts = graph.clear_buffer(&name("clear queue counts"), PassRole::Geometry, counts, 0);
 
     let has_masked = frame.scene.has_masked();
     let variant = |shader: &str| if has_masked { format!("{shader}#mask") } else { shader.to_owned() };
@@ -91,7 +99,7 @@ pub fn rasterize(
     pass.read("DrawCommands", &frame.buffers.commands).read("DrawCounts", &frame.buffers.command_counts);
     let keys = pass.write("SampleKeys", keys);
     let large = pass.write("LargeTriangles", large);
-    let large_count = pass.write("LargeCount", large_count);
+    let counts = pass.write("QueueCounts", counts);
     let most_groups = frame.features().max_workgroup_count[0];
     for bucket in 0..BUCKETS {
         let first = frame.scene.bucket_first[bucket];
@@ -110,23 +118,31 @@ pub fn rasterize(
         PassRole::Geometry,
         &frame.shader("surfaces/compute_raster/bin.comp")?,
     );
-    pass.constant("LARGE_CAPACITY", large_capacity).constant("JOB_CAPACITY", job_capacity);
+    pass.constant("LARGE_CAPACITY", large_capacity)
+        .constant("JOB_CAPACITY", job_capacity)
+        .constant("CLIPPED_CAPACITY", clipped_capacity);
     pass.read("DrawCommands", &frame.buffers.commands);
-    pass.read("LargeTriangles", &large).read("LargeCount", &large_count);
+    pass.read("LargeTriangles", &large);
     let jobs = pass.write("TileJobs", jobs);
-    let job_count = pass.write("JobCount", job_count);
+    let counts = pass.write("QueueCounts", counts);
+    let clipped = pass.write("ClippedTriangles", clipped);
     pass.dispatch([LIST_GROUPS, 1, 1]);
     pass.finish();
 
     let shader = frame.shader(&variant("surfaces/compute_raster/large.comp"))?;
     let mut pass = frame.compute(graph, &name("large triangles"), PassRole::Geometry, &shader);
     pass.constant("SAMPLES", samples).constant("JOB_CAPACITY", job_capacity);
-    pass.read("DrawCommands", &frame.buffers.commands).read("TileJobs", &jobs).read("JobCount", &job_count);
+    pass.read("DrawCommands", &frame.buffers.commands).read("TileJobs", &jobs).read("QueueCounts", &counts);
+    pass.read("ClippedTriangles", &clipped);
     let keys = pass.write("SampleKeys", keys);
     pass.dispatch([LIST_GROUPS, 1, 1]);
     pass.finish();
 
-    frame.watch(graph, "large_triangles", &large_count, large_capacity, false);
-    frame.watch(graph, "tile_jobs", &job_count, job_capacity, false);
+    let queues = [
+        ("large_triangles", large_capacity),
+        ("tile_jobs", job_capacity),
+        ("clipped_triangles", clipped_capacity),
+    ];
+    frame.watch_all(graph, &counts, &queues);
     Ok(keys)
 }

@@ -3,6 +3,8 @@
 // Vertices are snapped to 1/256 pixel, edge functions are exact integers, ties follow the top-left rule: triangles that share
 // an edge neither overlap nor leave a gap. A sample's key is its depth (reversed, so the greatest is nearest) above the
 // complement of the triangle's place in the order of draws: of equal depths the first drawn wins, as in a raster pass.
+//
+// EDGE: the type of the edge functions that the shader has, int64_t if it does not say.
 #ifndef AFTERLIGHT_RASTER
 #define AFTERLIGHT_RASTER
 #extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
@@ -11,6 +13,9 @@
 #include "frame.glsl"
 #include "triangle.glsl"
 #include "samples.glsl"
+#ifndef EDGE
+#define EDGE int64_t
+#endif
 
 // One key for each sample; the keys of a pixel are neighbours.
 layout(set = 0, binding = 8, scalar) buffer SampleKeys {
@@ -22,13 +27,17 @@ layout(set = 0, binding = 9, scalar) readonly buffer DrawCommands {
 };
 
 const int SUBPIXELS = 256;
-// Snapped coordinates are clamped to this many pixels, so that products of their differences fit into 64 bits.
-const float GUARD_BAND_PX = 2.0e6;
+// Half the side of the square around the image's centre within which vertices are snapped as they are, pixels. A triangle that leaves it is
+// clipped to it first: edges stay straight, and coordinates of 24 bits and images of up to 16,384 pixels keep products of differences within
+// 51 bits. A float so far out still resolves 1/256 pixel.
+const float GUARD_BAND_PX = 32768.0;
 
-// A triangle on the screen, its front towards the viewer, vertices so ordered that the inside is at positive edge functions.
+// A triangle on the screen, its front towards the viewer, vertices so ordered that the inside is at positive edge functions and p0 is the
+// farthest.
 struct ScreenTriangle {
     ivec2 p0, p1, p2;   // 1/256 pixel
-    vec3 depth;
+    float depth;        // at p0
+    vec2 depth_gain;    // of the edge functions of p2 -> p0 and p0 -> p1, not negative
 };
 
 struct RasterDraw {
@@ -47,94 +56,99 @@ RasterDraw load_raster_draw(uint command) {
 
 ivec2 snapped(vec4 clip) {
     vec2 px = (clip.xy / clip.w * 0.5 + 0.5) * vec2(frame.size_px);
-    return ivec2(round(clamp(px, -GUARD_BAND_PX, GUARD_BAND_PX) * float(SUBPIXELS)));
+    return ivec2(round(px * float(SUBPIXELS)));
 }
 
-bool before_near_plane(vec4 clip) {
-    return clip.z > clip.w;
+// Whether a vertex may be snapped as it is: behind the near plane and within the guard band.
+bool is_within(vec4 clip) {
+    return clip.z <= clip.w && all(lessThanEqual(abs(clip.xy) * vec2(frame.size_px), vec2(2.0 * GUARD_BAND_PX * clip.w)));
 }
 
-// Where an edge meets the near plane, the same from both of its ends.
-vec4 at_near_plane(vec4 inside, vec4 outside) {
-    float a = inside.w - inside.z, b = outside.z - outside.w;
-    return mix(inside, outside, a / (a + b));
+// An exact integer that is not negative as a float, rounded once or twice. Devices convert 64 bits at a quarter of the speed of 32.
+float float_of(int e) {
+    return float(e);
+}
+float float_of(int64_t e) {
+    uvec2 halves = unpackUint2x32(uint64_t(e));
+    return float(halves.y) * 4294967296.0 + float(halves.x);
 }
 
-// Part `part` (0 or 1) of a triangle clipped at the near plane; false where there is none or it faces away.
-bool screen_triangle(RasterDraw d, vec4 c0, vec4 c1, vec4 c2, uint part, out ScreenTriangle t) {
-    uint outside = uint(before_near_plane(c0)) | uint(before_near_plane(c1)) << 1 | uint(before_near_plane(c2)) << 2;
-    if (outside == 7u || part == 1u && bitCount(outside) != 1u) {
-        return false;
-    }
-    if (outside != 0u) {
-        // Rotated so that the vertex that lies on the other side of the plane than the two others comes first.
-        uint odd = bitCount(outside) == 1u ? outside : 7u - outside;
-        if (odd == 2u) {
-            vec4 c = c0;
-            c0 = c1;
-            c1 = c2;
-            c2 = c;
-        } else if (odd == 4u) {
-            vec4 c = c0;
-            c0 = c2;
-            c2 = c1;
-            c1 = c;
-        }
-        if (bitCount(outside) == 2u) {
-            c1 = at_near_plane(c0, c1);
-            c2 = at_near_plane(c0, c2);
-        } else if (part == 0u) {
-            c0 = at_near_plane(c1, c0);
-        } else {
-            vec4 first = at_near_plane(c1, c0);
-            c1 = c2;
-            c2 = at_near_plane(c2, c0);
-            c0 = first;
-        }
-    }
-    t.p0 = snapped(c0);
-    t.p1 = snapped(c1);
-    t.p2 = snapped(c2);
-    t.depth = vec3(c0.z / c0.w, c1.z / c1.w, c2.z / c2.w);
-    ivec2 a = t.p1 - t.p0, b = t.p2 - t.p0;
-    int64_t area = int64_t(a.x) * int64_t(b.y) - int64_t(a.y) * int64_t(b.x);
+// Twice the area, positive where the vertices run clockwise on the screen, whose y points down.
+int64_t doubled_area(ivec2 p0, ivec2 p1, ivec2 p2) {
+    ivec2 a = p1 - p0, b = p2 - p0;
+    return int64_t(a.x) * int64_t(b.y) - int64_t(a.y) * int64_t(b.x);
+}
+
+// Whether a triangle or a polygon of this area shows.
+bool shows(RasterDraw d, int64_t area) {
     bool mirrored = (d.data.flags & DRAW_MIRRORED) != 0u;
     bool front = (area < 0L) != mirrored;
-    if (area == 0L || !front && !d.double_sided) {
+    return area != 0L && (front || d.double_sided);
+}
+
+// The triangle of three vertices whose area is not 0.
+//
+// Depth is interpolated from the farthest vertex by what the two others are nearer, with the exact edge functions as weights: all terms are
+// positive, so that no digits cancel, however thin or steep the triangle is. A plane over the screen in floats loses them. The result does
+// not depend on the order of the vertices.
+ScreenTriangle ordered_triangle(ivec2 p0, ivec2 p1, ivec2 p2, vec3 depth, int64_t area) {
+    ScreenTriangle t = ScreenTriangle(p0, p1, p2, depth.x, vec2(0.0));
+    if (area < 0L) {
+        t.p1 = p2;
+        t.p2 = p1;
+        depth = depth.xzy;
+    }
+    if (depth.y < depth.x && depth.y <= depth.z) {
+        t = ScreenTriangle(t.p1, t.p2, t.p0, depth.y, vec2(0.0));
+        depth = depth.yzx;
+    } else if (depth.z < depth.x) {
+        t = ScreenTriangle(t.p2, t.p0, t.p1, depth.z, vec2(0.0));
+        depth = depth.zxy;
+    }
+    t.depth_gain = (depth.yz - depth.x) / float_of(abs(area));
+    return t;
+}
+
+// A triangle whose vertices are all within; false where it does not show.
+bool screen_triangle(RasterDraw d, vec4 c0, vec4 c1, vec4 c2, out ScreenTriangle t) {
+    ivec2 p0 = snapped(c0), p1 = snapped(c1), p2 = snapped(c2);
+    int64_t area = doubled_area(p0, p1, p2);
+    if (!shows(d, area)) {
         return false;
     }
-    if (area < 0L) {
-        ivec2 p = t.p1;
-        t.p1 = t.p2;
-        t.p2 = p;
-        t.depth = t.depth.xzy;
-    }
+    t = ordered_triangle(p0, p1, p2, vec3(c0.z / c0.w, c1.z / c1.w, c2.z / c2.w), area);
     return true;
 }
 
-// Depth over the screen, pixels.
-struct DepthPlane {
-    float at_p0;
-    vec2 slope;
-    float least, greatest;
+// Edge functions of p2 -> p0 and p0 -> p1 at a pixel's corner, and the edges: what depth is interpolated by.
+struct DepthEdges {
+    EDGE at_p1, at_p2;
+    ivec2 d20, d01;
 };
 
-DepthPlane depth_plane(ScreenTriangle t) {
-    vec2 a = vec2(t.p1 - t.p0) / float(SUBPIXELS), b = vec2(t.p2 - t.p0) / float(SUBPIXELS);
-    float u = t.depth.y - t.depth.x, v = t.depth.z - t.depth.x;
-    vec2 slope = vec2(u * b.y - v * a.y, v * a.x - u * b.x) / (a.x * b.y - a.y * b.x);
-    return DepthPlane(t.depth.x, slope, min(t.depth.x, min(t.depth.y, t.depth.z)),
-                      max(t.depth.x, max(t.depth.y, t.depth.z)));
+// Edge function at a sample, from that at the pixel's corner.
+EDGE edge_at_sample(EDGE at_corner, ivec2 d, ivec2 sample_subpixels) {
+    return at_corner + EDGE(d.x) * EDGE(sample_subpixels.y) - EDGE(d.y) * EDGE(sample_subpixels.x);
 }
 
-float depth_at(DepthPlane plane, vec2 from_p0_px) {
-    return clamp(plane.at_p0 + dot(plane.slope, from_p0_px), plane.least, plane.greatest);
+ivec2 sample_subpixels(uint i) {
+    return ivec2(sample_location(i) * float(SUBPIXELS));
 }
 
-// 0 where a sample exactly on the edge from a to b belongs to the triangle (top-left rule), else -1.
-int edge_bias(ivec2 a, ivec2 b) {
+// Depth at a sample that the triangle covers.
+float depth_at(ScreenTriangle t, DepthEdges e, uint i) {
+    ivec2 s = sample_subpixels(i);
+    // Sums and products apart: with one of them fused, a triangle and its reverse would differ by a rounding.
+    precise float nearer = t.depth_gain.x * float_of(edge_at_sample(e.at_p1, e.d20, s))
+                         + t.depth_gain.y * float_of(edge_at_sample(e.at_p2, e.d01, s));
+    return min(t.depth + nearer, 1.0);
+}
+
+// The least value of the edge function from a to b that is inside: 0 where a sample exactly on the edge belongs to the triangle (top-left
+// rule), else 1.
+int edge_least(ivec2 a, ivec2 b) {
     ivec2 d = b - a;
-    return d.y < 0 || d.y == 0 && d.x > 0 ? 0 : -1;
+    return d.y < 0 || d.y == 0 && d.x > 0 ? 0 : 1;
 }
 
 // First and last pixel that a triangle's box touches, within the image; empty where first > last.
@@ -170,12 +184,11 @@ bool passes_alpha(RasterDraw d, uint triangle, ivec2 pixel) {
 }
 
 // Writes the triangle's key to every sample of the mask where it is the nearest so far. `order` is the triangle's place in the order of draws.
-void keep_nearest(ivec2 pixel, uint covered, ScreenTriangle t, DepthPlane plane, uint order, RasterDraw d) {
-    vec2 corner = vec2(pixel) - vec2(t.p0) / float(SUBPIXELS);
+void keep_nearest(ivec2 pixel, uint covered, ScreenTriangle t, DepthEdges edges, uint order, RasterDraw d) {
     uint wins = 0u;
     for (uint i = 0u; i < SAMPLES; ++i) {
         if ((covered >> i & 1u) != 0u) {
-            float depth = depth_at(plane, corner + sample_location(i));
+            float depth = depth_at(t, edges, i);
             uint64_t key = packUint2x32(uvec2(~order, floatBitsToUint(depth)));
             // If this plain read is out of date, the key was smaller: an atomic is done that was not needed, and no sample is lost.
             wins |= depth > 0.0 && key > sample_keys[key_index(pixel, i)] ? 1u << i : 0u;
@@ -186,7 +199,7 @@ void keep_nearest(ivec2 pixel, uint covered, ScreenTriangle t, DepthPlane plane,
     }
     for (uint i = 0u; i < SAMPLES; ++i) {
         if ((wins >> i & 1u) != 0u) {
-            float depth = depth_at(plane, corner + sample_location(i));
+            float depth = depth_at(t, edges, i);
             atomicMax(sample_keys[key_index(pixel, i)], packUint2x32(uvec2(~order, floatBitsToUint(depth))));
         }
     }

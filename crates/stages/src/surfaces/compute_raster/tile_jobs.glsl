@@ -4,16 +4,25 @@
 
 // Each of 64 threads takes sixteen pixels. Smaller tiles would make more jobs, larger ones would leave threads idle at a triangle's edges.
 const int TILE_PX = 32;
+// Bit of a job's second word: the first is a place in ClippedTriangles, not in the order of draws.
+const uint CLIPPED_JOB = 1u << 31;
+
+// A part of a triangle that was clipped.
+struct ClippedTriangle {
+    ScreenTriangle triangle;
+    uint order;     // place of the whole triangle in the order of draws
+};
 
 // An edge function over the image, 64 bits: exact for any triangle within the guard band.
 struct Edge {
-    int64_t at_origin;  // at the image's corner, the tie rule added
+    int64_t at_origin;  // at the image's corner
     ivec2 d;
+    int least;          // the least value that is inside
 };
 
 Edge edge_between(ivec2 a, ivec2 b) {
     ivec2 d = b - a;
-    return Edge(int64_t(d.y) * int64_t(a.x) - int64_t(d.x) * int64_t(a.y) + int64_t(edge_bias(a, b)), d);
+    return Edge(int64_t(d.y) * int64_t(a.x) - int64_t(d.x) * int64_t(a.y), d, edge_least(a, b));
 }
 
 int64_t edge_at(Edge e, ivec2 subpixel) {
@@ -23,7 +32,7 @@ int64_t edge_at(Edge e, ivec2 subpixel) {
 // False if a box of size_px pixels lies completely outside of an edge.
 bool edge_may_touch(Edge e, ivec2 pixel, int size_px) {
     int64_t gain = int64_t(size_px * SUBPIXELS) * int64_t(max(e.d.x, 0) + max(-e.d.y, 0));
-    return edge_at(e, pixel * SUBPIXELS) + gain >= 0L;
+    return edge_at(e, pixel * SUBPIXELS) + gain >= int64_t(e.least);
 }
 
 bool box_may_touch(ScreenTriangle t, ivec2 pixel, int size_px) {

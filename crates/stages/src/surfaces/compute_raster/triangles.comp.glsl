@@ -4,6 +4,8 @@
 // x 8. ALPHA_MASK tests alpha where a material has a cutoff.
 #version 460
 #extension GL_GOOGLE_include_directive : require
+// Exact for small triangles.
+#define EDGE int
 #include "surfaces/compute_raster/raster.glsl"
 
 layout(local_size_x = 128) in;
@@ -13,10 +15,8 @@ layout(set = 0, binding = 10, scalar) readonly buffer DrawCounts {
 layout(set = 0, binding = 11, scalar) writeonly buffer LargeTriangles {
     uint large_triangles[];
 };
-layout(set = 0, binding = 12, scalar) buffer LargeCount {
-    uint large_needed;
-    uint large_dropped;
-};
+#define QUEUE_ACCESS
+#include "surfaces/compute_raster/queue_counts.glsl"
 layout(constant_id = 10) const uint LARGE_CAPACITY = 0u;
 layout(push_constant, scalar) uniform Push {
     uint bucket;
@@ -29,30 +29,38 @@ layout(push_constant, scalar) uniform Push {
 layout(constant_id = 11) const uint SMALL_PX = 16u;
 
 void rasterize_small(ScreenTriangle t, ivec2 first, ivec2 last, uint order, RasterDraw d) {
-    DepthPlane plane = depth_plane(t);
     ivec2 d0 = t.p1 - t.p0, d1 = t.p2 - t.p1, d2 = t.p0 - t.p2;
-    ivec3 bias = ivec3(edge_bias(t.p0, t.p1), edge_bias(t.p1, t.p2), edge_bias(t.p2, t.p0));
+    ivec3 least = ivec3(edge_least(t.p0, t.p1), edge_least(t.p1, t.p2), edge_least(t.p2, t.p0));
     for (int y = first.y; y <= last.y; ++y) {
         for (int x = first.x; x <= last.x; ++x) {
             ivec2 corner = ivec2(x, y) * SUBPIXELS;
             ivec2 q0 = corner - t.p0, q1 = corner - t.p1, q2 = corner - t.p2;
-            ivec3 edge = bias + ivec3(d0.x * q0.y - d0.y * q0.x, d1.x * q1.y - d1.y * q1.x, d2.x * q2.y - d2.y * q2.x);
+            ivec3 edge = ivec3(d0.x * q0.y - d0.y * q0.x, d1.x * q1.y - d1.y * q1.x, d2.x * q2.y - d2.y * q2.x);
             // The most that each edge function grows within a pixel.
             ivec3 gain = SUBPIXELS * (max(ivec3(d0.x, d1.x, d2.x), 0) + max(-ivec3(d0.y, d1.y, d2.y), 0));
-            if (any(lessThan(edge + gain, ivec3(0)))) {
+            if (any(lessThan(edge + gain, least))) {
                 continue;
             }
             uint covered = 0u;
             for (uint i = 0u; i < SAMPLES; ++i) {
-                ivec2 s = ivec2(sample_location(i) * float(SUBPIXELS));
+                ivec2 s = sample_subpixels(i);
                 ivec3 at = edge + ivec3(d0.x, d1.x, d2.x) * s.y - ivec3(d0.y, d1.y, d2.y) * s.x;
-                covered |= all(greaterThanEqual(at, ivec3(0))) ? 1u << i : 0u;
+                covered |= all(greaterThanEqual(at, least)) ? 1u << i : 0u;
             }
             if (covered != 0u) {
-                keep_nearest(ivec2(x, y), covered, t, plane, order, d);
+                keep_nearest(ivec2(x, y), covered, t, DepthEdges(edge.z, edge.x, d2, d0), order, d);
             }
         }
     }
+}
+
+// Whether a triangle that leaves the guard band lies beyond one side of the view. A hundredth is left beside the image, so that snapping
+// moves none that this leaves out onto a sample.
+bool misses_view(vec4 c0, vec4 c1, vec4 c2) {
+    vec3 x = vec3(c0.x, c1.x, c2.x), y = vec3(c0.y, c1.y, c2.y), z = vec3(c0.z, c1.z, c2.z), w = vec3(c0.w, c1.w, c2.w);
+    vec3 side = 1.01 * w;
+    return all(greaterThan(x, side)) || all(greaterThan(-x, side)) || all(greaterThan(y, side)) || all(greaterThan(-y, side))
+        || all(greaterThan(z, w)) || all(lessThan(z, vec3(0.0)));
 }
 
 void main() {
@@ -69,12 +77,15 @@ void main() {
     }
     vec4 c0, c1, c2;
     vertices_clip(d.data, triangle_vertices(triangle, d.data), c0, c1, c2);
-    bool crosses = before_near_plane(c0) || before_near_plane(c1) || before_near_plane(c2);
-    bool is_large = crosses;
+    bool is_large = !(is_within(c0) && is_within(c1) && is_within(c2));
     ScreenTriangle t;
     ivec2 first, last;
-    if (!crosses) {
-        if (!screen_triangle(d, c0, c1, c2, 0u, t)) {
+    if (is_large) {
+        if (misses_view(c0, c1, c2)) {
+            return;
+        }
+    } else {
+        if (!screen_triangle(d, c0, c1, c2, t)) {
             return;
         }
         pixel_box(t, first, last);
