@@ -278,6 +278,50 @@ fn tangents_by_derivatives_are_an_approximation() {
     }
 }
 
+/// Gives each triangle its own normal and the tangent of its texture coordinates, of set 0 or 1, of which the other is at random.
+fn with_faces_tangents(mut scene: Scene, uv_set: u32) -> Scene {
+    let mut rng = SplitMix64::new(11);
+    for (positions, attributes) in
+        scene.positions_os.as_chunks::<3>().0.iter().zip(scene.attributes.as_chunks_mut::<3>().0)
+    {
+        let [a, b, c] = positions.map(Vec3::from);
+        let normal = (b - a).cross(c - a).normalize_or(Vec3::Z);
+        let uv = [0, 1, 2].map(|_| Vec2::new(rng.between(-2.0, 2.0), rng.between(-2.0, 2.0)));
+        let (ab, ac) = (uv[1] - uv[0], uv[2] - uv[0]);
+        let area = ab.perp_dot(ac);
+        let tangent = (ac.y * (b - a) - ab.y * (c - a)) * area.signum();
+        // In glTF v runs downwards, the bitangent upwards.
+        let sign = -area.signum();
+        for (vertex, uv) in attributes.iter_mut().zip(uv) {
+            let other = Vec2::new(rng.between(-2.0, 2.0), rng.between(-2.0, 2.0));
+            let [uv0, uv1] = if uv_set == 0 { [uv, other] } else { [other, uv] };
+            *vertex = VertexAttributes::pack(normal, tangent, sign, uv0, uv1, [1.0; 4]);
+        }
+    }
+    for texture in &mut scene.materials[0].normal_texture {
+        texture.uv_set = uv_set;
+    }
+    scene
+}
+
+/// Where tangents are those of the triangles' texture coordinates, mirrored ones among them and of either set, derivatives find them.
+#[test]
+fn derivatives_find_the_tangents_of_texture_coordinates() {
+    let gpu = afterlight_testkit::gpu();
+    for uv_set in [0, 1] {
+        let stage = Stage::of(&gpu, with_faces_tangents(soup(Case::Mirrored, 21), uv_set));
+        let settings = view(&stage, 21, 1);
+        let reference = stage.image(find("forward").unwrap(), &settings);
+        let dais = find("dais").unwrap();
+        for way in ["vertices", "derivatives"] {
+            let params = params(dais, &[("tangents", way)]);
+            let db = psnr(&reference, &image_of(&mut stage.prepare_with(dais, &settings, &params)));
+            println!("set {uv_set}, {way}: {db:.2} dB");
+            assert!(db >= 45.0, "set {uv_set}, {way}: {db:.2} dB");
+        }
+    }
+}
+
 /// A technique's PSNR to `forward` with one of its shaders changed.
 fn changed(stage: &Stage, settings: &Settings, id: &str, shader: Shader) -> f64 {
     let technique = find(id).unwrap();

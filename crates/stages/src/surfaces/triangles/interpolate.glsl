@@ -75,17 +75,25 @@ void interpolate_frame(uint record, vec2 from_anchor_px, float w, inout SurfaceP
 }
 
 // Normal and tangent where the record has changes of the normal alone (Schied and Dachsbacher 2015, section 4.3). `p` has position and
-// texture coordinates.
-void find_frame(uint record, vec2 from_anchor_px, vec2 pixel_center, float w, inout SurfacePoint p) {
+// texture coordinates; the tangent follows the set that the material's normal map is seen through.
+void find_frame(uint record, vec2 from_anchor_px, vec2 pixel_center, float w, uint material, inout SurfacePoint p) {
     p.normal_ws = vec3(record_affine(record + 3u, from_anchor_px).x, record_affine(record + 6u, from_anchor_px).x,
                        record_affine(record + 9u, from_anchor_px).x) * w;
     p.tangent_ws = vec4(0.0);
     if (NORMAL_BUCKETS > 0u) {
-        vec3 right = record_affine(record, from_anchor_px + vec2(1.0, 0.0));
-        vec3 below = record_affine(record, from_anchor_px + vec2(0.0, 1.0));
-        vec3 dp_dx = interpolated_position(right, pixel_center + vec2(1.0, 0.0)) - p.position_ws;
-        vec3 dp_dy = interpolated_position(below, pixel_center + vec2(0.0, 1.0)) - p.position_ws;
-        p.tangent_ws = tangent_from_changes(p.normal_ws, dp_dx, dp_dy, p.uv0);
+        vec3 first_words = record_affine(record, from_anchor_px);
+        // A step on the screen at one distance, then along the ray by the change of the distance. Not the difference to the position a pixel
+        // on, which of a triangle seen at a flat angle may lie beyond the horizon of its plane.
+        bool orthographic = frame.eye_ws.w == 0.0;
+        vec3 ray = orthographic ? frame.distance_from_world.xyz : (frame.eye_ws.xyz - p.position_ws) / first_words.x;
+        vec3 dp_dx = interpolated_position(first_words, pixel_center + vec2(1.0, 0.0)) - p.position_ws + ray * first_words.y;
+        vec3 dp_dy = interpolated_position(first_words, pixel_center + vec2(0.0, 1.0)) - p.position_ws + ray * first_words.z;
+        bool second_set = HAS_UV1 != 0u && (load_material(material).normal_slot & (1u << 24)) != 0u;
+        TextureCoordinates at = p.uv0;
+        if (second_set) {
+            at = p.uv1;
+        }
+        p.tangent_ws = tangent_from_changes(p.normal_ws, dp_dx, dp_dy, at);
     }
 }
 
@@ -130,7 +138,7 @@ SurfacePoint interpolated_point(uint index, vec2 pixel, out uint material) {
         }
     }
     if (TANGENTS == TANGENTS_BY_DERIVATIVES) {
-        find_frame(record, from_anchor, center, w, p);
+        find_frame(record, from_anchor, center, w, material, p);
     } else {
         interpolate_frame(record, from_anchor, w, p);
     }
