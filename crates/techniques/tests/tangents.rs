@@ -298,7 +298,7 @@ fn with_faces_tangents(mut scene: Scene, uv_set: u32) -> Scene {
             *vertex = VertexAttributes::pack(normal, tangent, sign, uv0, uv1, [1.0; 4]);
         }
     }
-    for texture in &mut scene.materials[0].normal_texture {
+    if let Some(texture) = &mut scene.materials[0].normal_texture {
         texture.uv_set = uv_set;
     }
     scene
