@@ -151,6 +151,12 @@ pub trait Technique: Send + Sync {
     /// [`params_of`], whatever their values.
     fn predict(&self, workload: &Workload, params: &Params) -> Cost;
 
+    /// Whether it computes the reference's image with its parameters, all of [`params_of`]: `info().exactness` is that of their defaults.
+    fn exactness(&self, params: &Params) -> Exactness {
+        let _ = params;
+        self.info().exactness
+    }
+
     /// Declares its passes, named `id/stage`, and returns the image of linear radiance, RGBA16F, that they end in.
     ///
     /// # Errors

@@ -1,7 +1,7 @@
 //! What a comparison comes to.
 
 use afterlight_measure::{Run, RunResult, Status};
-use afterlight_techniques::{Exactness, find};
+use afterlight_techniques::{Exactness, find, params_of, set_param};
 
 /// How many times the fastest technique's frame time one with less memory may take.
 pub const TIME_FACTOR: f64 = 1.5;
@@ -34,9 +34,8 @@ impl<'a> Conclusion<'a> {
         let frame_ms = |result: &RunResult| result.frame_ms.map_or(f64::INFINITY, |frame| frame.median);
         ordered.sort_by(|a, b| frame_ms(a).total_cmp(&frame_ms(b)));
         let is_exact = |result: &&&RunResult| {
-            let exactness = find(&result.technique).map(|technique| technique.info().exactness);
             let has_figures = result.status == Status::Ok && result.frame_ms.is_some();
-            has_figures && matches!(exactness, Some(Exactness::Exact { .. }))
+            has_figures && matches!(exactness(result), Some(Exactness::Exact { .. }))
         };
         let fastest_exact = ordered.iter().find(is_exact).copied();
         let bytes = |result: &RunResult| result.memory.as_ref().map(|memory| memory.technique_bytes);
@@ -47,6 +46,18 @@ impl<'a> Conclusion<'a> {
         });
         Conclusion { ordered, other_samples, fastest_exact, least_memory }
     }
+}
+
+/// Exactness of a result's technique with its parameters; `None` of a technique that is not known.
+fn exactness(result: &RunResult) -> Option<Exactness> {
+    let technique = find(&result.technique)?;
+    let mut params = params_of(technique);
+    for (key, value) in &result.params {
+        let text = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+        // A record of another version may have parameters that are gone.
+        let _ = set_param(technique, &mut params, key, &text);
+    }
+    Some(technique.exactness(&params))
 }
 
 #[cfg(test)]

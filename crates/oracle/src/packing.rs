@@ -32,7 +32,11 @@ pub fn unpack_normal(bits: u32) -> DVec3 {
     octahedral_decode(DVec2::new(snorm16(bits), snorm16(bits >> 16)))
 }
 
-/// The unit tangent of packed bits and the bitangent's sign (`VertexAttributes::tangent_os_oct`).
+/// The unit tangent of packed bits, zero where they say that there is none, and the bitangent's sign (`VertexAttributes::tangent_os_oct`).
 pub fn unpack_tangent(bits: u32) -> (DVec3, f64) {
-    (unpack_normal(bits & !0x1_0000), if bits & 0x1_0000 != 0 { -1.0 } else { 1.0 })
+    let sign = if bits & 0x1_0000 != 0 { -1.0 } else { 1.0 };
+    if bits as u16 as i16 == i16::MIN {
+        return (DVec3::ZERO, sign);
+    }
+    (unpack_normal(bits & !0x1_0000), sign)
 }

@@ -6,6 +6,7 @@ use glam::{DMat3, DMat4, DVec2, DVec3, DVec4};
 use crate::{
     brdf::{Surface, shade},
     packing::{unpack_normal, unpack_tangent},
+    tangent::tangent_of,
     texture::{sample_finest, transformed_uv},
     tiles::world_from_view,
 };
@@ -51,7 +52,7 @@ pub struct Attributes {
     pub normal_ws: DVec3,
     /// Interpolated tangent, world space, not unit.
     pub tangent_ws: DVec3,
-    /// Sign of the bitangent `cross(normal, tangent)`.
+    /// Sign of the bitangent `cross(normal, tangent)`, interpolated: between -1 and 1 where the vertices have both signs.
     pub handedness: f64,
     /// Both sets of texture coordinates.
     pub uv: [DVec2; 2],
@@ -252,26 +253,25 @@ impl<'a> RayScene<'a> {
             position_ws: DVec3::ZERO,
             normal_ws: DVec3::ZERO,
             tangent_ws: DVec3::ZERO,
-            handedness: 1.0,
+            handedness: 0.0,
             uv: [DVec2::ZERO; 2],
             color: DVec4::ZERO,
         };
-        let mut signs = 0.0;
         for (vertex, weight) in vertices.into_iter().zip(weights) {
             let a = &self.scene.attributes[vertex];
             let position_os = DVec3::from_array(self.scene.positions_os[vertex].map(f64::from));
             let (tangent_os, sign) = unpack_tangent(a.tangent_os_oct);
             out.position_ws += weight * world_from_object.transform_point3(position_os);
-            out.normal_ws += weight * (cofactor * unpack_normal(a.normal_os_oct)).normalize_or_zero();
-            out.tangent_ws += weight * (linear * tangent_os).normalize_or_zero();
-            signs += weight * sign * mirror;
+            let normal_ws = (cofactor * unpack_normal(a.normal_os_oct)).normalize_or_zero();
+            out.normal_ws += weight * normal_ws;
+            out.tangent_ws += weight * tangent_of(normal_ws, linear * tangent_os);
+            out.handedness += weight * sign * mirror;
             for set in 0..2 {
                 out.uv[set as usize] += weight * a.uv(set).as_dvec2();
             }
             let byte = |c: u32| f64::from(a.color_rgba8 >> (8 * c) & 0xff) / 255.0;
             out.color += weight * DVec4::new(byte(0), byte(1), byte(2), byte(3));
         }
-        out.handedness = if signs < 0.0 { -1.0 } else { 1.0 };
         out
     }
 
@@ -292,10 +292,10 @@ impl<'a> RayScene<'a> {
         let at = self.attributes(hit);
         let mut normal_ws = at.normal_ws;
         if let Some(texel) = self.sample(m.normal_texture.as_ref(), &at, false) {
-            // the device keeps x and y alone, and finds z from them
-            let xy = texel.truncate().truncate() * 2.0 - 1.0;
-            let z = (1.0 - xy.length_squared()).max(0.0).sqrt();
-            let xy = xy * f64::from(m.normal_scale);
+            // of a texel that is not unit the direction counts; the device keeps x and y of that, and finds z from them
+            let stored = texel.truncate() * 2.0 - 1.0;
+            let unit = stored.with_z(stored.z.max(0.0)).normalize_or(DVec3::Z);
+            let (xy, z) = (unit.truncate() * f64::from(m.normal_scale), unit.z);
             let bitangent_ws = at.handedness * at.normal_ws.cross(at.tangent_ws);
             normal_ws = xy.x * at.tangent_ws + xy.y * bitangent_ws + z * at.normal_ws;
         }

@@ -8,6 +8,8 @@ use std::{path::PathBuf, sync::Arc};
 
 use glam::{Affine3A, Mat4, Vec2, Vec3};
 
+use crate::tangent;
+
 /// Attributes of one vertex besides its position, packed as the GPU reads them (28 bytes).
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
@@ -15,7 +17,8 @@ pub struct VertexAttributes {
     /// Unit normal in object space, octahedral, two 16-bit signed normalised numbers, x in the low half.
     pub normal_os_oct: u32,
     /// Unit tangent in object space, octahedral as the normal; bit 16 (the lowest bit of y) holds
-    /// the handedness instead: 1 for a bitangent of `-cross(normal, tangent)`.
+    /// the handedness instead: 1 for a bitangent of `-cross(normal, tangent)`. Where x is -32,768, which no direction has, there is
+    /// no tangent: it is then the world's X axis laid into the surface, or the Z axis where the normal's x is 0.9 or more.
     pub tangent_os_oct: u32,
     /// Texture coordinates, set 0, as the bits of two `f32`.
     pub uv0: [u32; 2],
@@ -467,9 +470,12 @@ impl Scene {
     }
 }
 
+/// Packed tangent of a vertex that has none: an x that no direction is packed to.
+const NO_TANGENT: u32 = 0x8000;
+
 impl VertexAttributes {
-    /// Packs attributes. `normal_os` and `tangent_os` need not be unit; `handedness` is the sign
-    /// of the bitangent (glTF's TANGENT.w). Angular error: at most 6.5e-5 rad (normal), 1.5e-4 (tangent), as tested in the oracle.
+    /// Packs attributes. `normal_os` and `tangent_os` need not be unit; a tangent without a length or along the normal is none, for which every
+    /// renderer takes the same direction in world space ([`Self::tangent_os_oct`]); `handedness` is the sign of the bitangent (glTF's TANGENT.w). Angular error: at most 6.5e-5 rad (normal), 1.5e-4 (tangent), as tested in the oracle.
     pub fn pack(
         normal_os: Vec3,
         tangent_os: Vec3,
@@ -479,9 +485,10 @@ impl VertexAttributes {
         color: [f32; 4],
     ) -> Self {
         let sign_bit = u32::from(handedness < 0.0) << 16;
+        let tangent = tangent::tangent_beside(normal_os, tangent_os).map_or(NO_TANGENT, oct_encode);
         Self {
             normal_os_oct: oct_encode(normal_os),
-            tangent_os_oct: (oct_encode(tangent_os) & !(1 << 16)) | sign_bit,
+            tangent_os_oct: (tangent & !(1 << 16)) | sign_bit,
             uv0: [uv0.x.to_bits(), uv0.y.to_bits()],
             uv1: [uv1.x.to_bits(), uv1.y.to_bits()],
             color_rgba8: color
@@ -496,9 +503,12 @@ impl VertexAttributes {
         oct_decode(self.normal_os_oct)
     }
 
-    /// The unit tangent in object space and the bitangent's sign.
+    /// The unit tangent in object space, zero where there is none, and the bitangent's sign.
     pub fn tangent_os(&self) -> (Vec3, f32) {
         let sign = if self.tangent_os_oct >> 16 & 1 == 1 { -1.0 } else { 1.0 };
+        if self.tangent_os_oct & 0xffff == NO_TANGENT {
+            return (Vec3::ZERO, sign);
+        }
         (oct_decode(self.tangent_os_oct & !(1 << 16)), sign)
     }
 

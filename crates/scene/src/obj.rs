@@ -198,7 +198,7 @@ fn add_mesh(file: &Path, model: &tobj::Model, material: u32, scene: &mut Scene) 
             .collect();
         indices = (0..indices.len() as u32).collect();
     }
-    let mut tangents_os = vec![Vec4::new(1.0, 0.0, 0.0, 1.0); positions_os.len()];
+    let mut tangents_os = vec![Vec4::W; positions_os.len()];
     if scene.materials[material as usize].normal_texture.is_some() {
         let surface = tangent::Surface {
             positions_os: &positions_os,

@@ -243,7 +243,7 @@ fn mean_tangent(surface: &Surface, triangles: &[[u32; 3]], faces: &[Face], membe
 }
 
 /// Gives corners without a group the tangent that another corner has at the vertex (those of
-/// degenerate faces), else any one at right angles to the normal.
+/// degenerate faces), else none.
 fn fill_rest(surface: &Surface, corners: &[u32], faces: &[Face], out: &mut [Vec4]) {
     let is_degenerate = |corner: usize| faces[corner / 3].is_degenerate;
     let mut known = Vec::new();
@@ -257,9 +257,8 @@ fn fill_rest(surface: &Surface, corners: &[u32], faces: &[Face], out: &mut [Vec4
         if is_degenerate(corner) {
             out[corner] = known[vertex as usize];
         }
-        if out[corner].w == 0.0 || out[corner].truncate() == Vec3::ZERO {
-            let w = if out[corner].w == 0.0 { 1.0 } else { out[corner].w };
-            out[corner] = any_tangent(surface.normals_os[vertex as usize].into()).extend(w);
+        if out[corner].w == 0.0 {
+            out[corner] = Vec4::W;
         }
     }
 }
@@ -317,15 +316,26 @@ pub(crate) fn split_by_tangent(vertex_count: usize, indices: &[u32], corners: &[
     }
     for tangent in &mut tangents_os {
         if tangent.w == 0.0 {
-            *tangent = Vec4::new(1.0, 0.0, 0.0, 1.0);
+            *tangent = Vec4::W;
         }
     }
     Split { source, tangents_os, indices: out }
 }
 
-/// A unit vector at right angles to a normal.
-pub(crate) fn any_tangent(normal_os: Vec3) -> Vec3 {
-    normal_os.try_normalize().map_or(Vec3::X, Vec3::any_orthonormal_vector)
+/// Sine of the angle to its normal below which a tangent gives no frame. Twice what shaders take for parallel after the transform to world
+/// space, so that what packing turns a little is not taken for parallel there.
+const PARALLEL_SINE: f32 = 2e-3;
+
+/// The direction of a vertex's tangent; `None` where it has no length or lies along the normal.
+pub(crate) fn tangent_beside(normal_os: Vec3, tangent_os: Vec3) -> Option<Vec3> {
+    let (normal_os, tangent_os) = (direction(normal_os), direction(tangent_os));
+    (normal_os.cross(tangent_os).length() > PARALLEL_SINE).then_some(tangent_os)
+}
+
+/// A vector made unit, however short; zero where it has no direction.
+fn direction(v: Vec3) -> Vec3 {
+    let longest = v.abs().max_element();
+    if longest > 0.0 && longest.is_finite() { (v / longest).normalize() } else { Vec3::ZERO }
 }
 
 /// The unit normal of a triangle, or +Z where it has no area.

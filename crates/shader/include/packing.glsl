@@ -21,9 +21,16 @@ vec3 unpack_normal(uint bits) {
     return octahedral_decode(unpackSnorm2x16(bits));
 }
 
-// The tangent, and in w the sign of the bitangent, which is stored in the lowest bit of y.
+// The tangent, zero where there is none, and in w the sign of the bitangent, which is stored in the lowest bit of y.
 vec4 unpack_tangent(uint bits) {
-    return vec4(octahedral_decode(unpackSnorm2x16(bits & ~0x10000u)), (bits & 0x10000u) != 0u ? -1.0 : 1.0);
+    vec3 tangent = octahedral_decode(unpackSnorm2x16(bits & ~0x10000u));
+    bool none = (bits & 0xffffu) == 0x8000u;
+    return vec4(none ? vec3(0.0) : tangent, (bits & 0x10000u) != 0u ? -1.0 : 1.0);
+}
+
+// What unpack_tangent unpacks, of a unit tangent.
+uint pack_tangent(vec4 tangent) {
+    return packSnorm2x16(octahedral_encode(tangent.xyz)) & ~0x10000u | (tangent.w < 0.0 ? 0x10000u : 0u);
 }
 
 #endif

@@ -75,10 +75,26 @@ vec3 normal_to_world(vec4 r0, vec4 r1, vec4 r2, bool mirrored, vec3 n) {
     return unit_or_zero(mirrored ? -world : world);
 }
 
-// The tangent in world space, and the sign of the bitangent, which mirroring flips.
-vec4 tangent_to_world(vec4 r0, vec4 r1, vec4 r2, bool mirrored, vec4 t) {
-    vec3 world = vec3(dot(r0.xyz, t.xyz), dot(r1.xyz, t.xyz), dot(r2.xyz, t.xyz));
-    return vec4(unit_or_zero(world), mirrored ? -t.w : t.w);
+// Square of the sine of the angle (1e-3 rad) below which a tangent counts as parallel to its normal. Loading a scene leaves such tangents out;
+// here they come from transforms that flatten a mesh.
+const float PARALLEL_SINE_SQUARED = 1e-6;
+
+// The tangent of a surface that has none, or one along its unit normal, world space: the X axis laid into the surface, or the Z axis where
+// the normal is within about 25 degrees of X. Twin: oracle/src/tangent.rs.
+vec3 fallback_tangent(vec3 normal) {
+    vec3 axis = abs(normal.x) < 0.9 ? vec3(1.0, 0.0, 0.0) : vec3(0.0, 0.0, 1.0);
+    return unit_or_zero(axis - normal * dot(normal, axis));
+}
+
+// The tangent in world space, zero in object space where there is none, and the sign of the bitangent, which mirroring flips. The normal is that
+// of normal_to_world.
+vec4 tangent_to_world(vec4 r0, vec4 r1, vec4 r2, bool mirrored, vec4 t, vec3 normal_ws) {
+    vec3 world = unit_or_zero(vec3(dot(r0.xyz, t.xyz), dot(r1.xyz, t.xyz), dot(r2.xyz, t.xyz)));
+    vec3 side = cross(normal_ws, world);
+    if (dot(side, side) <= PARALLEL_SINE_SQUARED * dot(normal_ws, normal_ws)) {
+        world = fallback_tangent(normal_ws);
+    }
+    return vec4(world, mirrored ? -t.w : t.w);
 }
 
 // An affine transform given by its rows.

@@ -84,7 +84,8 @@ vec3 lobes(ShadingPoint p, vec3 l) {
     float c = 1.0 - v_dot_h;
     float c2 = c * c;
     float grazing = c2 * c2 * c;
-    float specular = distribution * visibility;
+    // A normal map may turn the normal away from the eye, and so from h: no microfacet faces h then (glTF 2.0, B.3.2).
+    float specular = n_dot_h > 0.0 ? distribution * visibility : 0.0;
     return vec3(1.0 - grazing, (1.0 - grazing) * specular, grazing * specular) * n_dot_l;
 }
 

@@ -69,6 +69,18 @@ vec2 load_uv(uint first, uint offset) {
     return uintBitsToFloat(uvec2(attributes[first + offset], attributes[first + offset + 1u]));
 }
 
+// Unit normal of the vertex whose attributes begin at word `first`, world space.
+vec3 load_normal(DrawData d, uint first) {
+    bool mirrored = (d.flags & DRAW_MIRRORED) != 0u;
+    return normal_to_world(d.object_row0, d.object_row1, d.object_row2, mirrored, unpack_normal(attributes[first]));
+}
+
+// Unit tangent of that vertex, world space, and the bitangent's sign.
+vec4 load_tangent(DrawData d, uint first, vec3 normal_ws) {
+    bool mirrored = (d.flags & DRAW_MIRRORED) != 0u;
+    return tangent_to_world(d.object_row0, d.object_row1, d.object_row2, mirrored, unpack_tangent(attributes[first + 1u]), normal_ws);
+}
+
 // Vertices of a triangle, and its draw.
 uvec3 triangle_vertices(uint id, DrawData d) {
     uint first = d.first_index + (id & ((1u << TRIANGLE_BITS) - 1u)) * 3u;
@@ -123,14 +135,11 @@ SurfacePoint triangle_point(uint id, vec2 ndc, out uint material) {
     SurfacePoint p;
     p.position_ws = b.at.x * p0 + b.at.y * p1 + b.at.z * p2;
     p.front_facing = b.counter_clockwise != mirrored;
-    p.normal_ws = b.at.x * normal_to_world(d.object_row0, d.object_row1, d.object_row2, mirrored, unpack_normal(attributes[a.x]))
-                + b.at.y * normal_to_world(d.object_row0, d.object_row1, d.object_row2, mirrored, unpack_normal(attributes[a.y]))
-                + b.at.z * normal_to_world(d.object_row0, d.object_row1, d.object_row2, mirrored, unpack_normal(attributes[a.z]));
+    vec3 n0 = load_normal(d, a.x), n1 = load_normal(d, a.y), n2 = load_normal(d, a.z);
+    p.normal_ws = b.at.x * n0 + b.at.y * n1 + b.at.z * n2;
     p.tangent_ws = vec4(0.0);
     if (NORMAL_BUCKETS > 0u) {
-        p.tangent_ws = b.at.x * tangent_to_world(d.object_row0, d.object_row1, d.object_row2, mirrored, unpack_tangent(attributes[a.x + 1u]))
-                     + b.at.y * tangent_to_world(d.object_row0, d.object_row1, d.object_row2, mirrored, unpack_tangent(attributes[a.y + 1u]))
-                     + b.at.z * tangent_to_world(d.object_row0, d.object_row1, d.object_row2, mirrored, unpack_tangent(attributes[a.z + 1u]));
+        p.tangent_ws = b.at.x * load_tangent(d, a.x, n0) + b.at.y * load_tangent(d, a.y, n1) + b.at.z * load_tangent(d, a.z, n2);
     }
     p.uv0 = interpolate_uv(b, load_uv(a.x, 2u), load_uv(a.y, 2u), load_uv(a.z, 2u));
     p.uv1 = p.uv0;

@@ -1,5 +1,5 @@
-// Attributes of every triangle from its record, at a pixel each. In: Pixels, 2 x 16 bits; the triangle buffer. Out: Found, twelve
-// floats a triangle: world position, normal, texture coordinates, their changes along x and y. Dispatch: triangles / 128.
+// Attributes of every triangle from its record, at a pixel each. In: Pixels, 2 x 16 bits; the triangle buffer. Out: Found, sixteen
+// floats a triangle: world position, normal, texture coordinates, their changes along x and y, tangent and the bitangent's sign. Dispatch: triangles / 128.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #define EXPLICIT_GRADIENTS
@@ -17,7 +17,8 @@ void main() {
     uint index = gl_GlobalInvocationID.x;
     uint material;
     SurfacePoint p = interpolated_point(index, vec2(pixels[index] & 0xffffu, pixels[index] >> 16), material);
-    found[index * 3u] = vec4(p.position_ws, p.normal_ws.x);
-    found[index * 3u + 1u] = vec4(p.normal_ws.yz, p.uv0.uv);
-    found[index * 3u + 2u] = vec4(p.uv0.ddx, p.uv0.ddy);
+    found[index * 4u] = vec4(p.position_ws, p.normal_ws.x);
+    found[index * 4u + 1u] = vec4(p.normal_ws.yz, p.uv0.uv);
+    found[index * 4u + 2u] = vec4(p.uv0.ddx, p.uv0.ddy);
+    found[index * 4u + 3u] = p.tangent_ws;
 }

@@ -182,8 +182,12 @@ fn formulas_give_the_papers_terms() {
             band: 200.0 + 400.0 + 40.0 * 15.5 + 420.0 + 210.0
         }
     );
-    let (once, cached) = (dais(&four), dais_cached(&four));
+    let (once, cached) = (dais(&four, 23.0), dais_cached(&four, 23.0));
     assert_eq!((cached.cmd, cached.mem), (20.0, once.mem));
+    // Three floats less of each of 100 / 3 triangles, stored once, and of each of 40 pixels' 1.5 surfaces, which read them.
+    let derivatives = dais(&four, 20.0);
+    assert!((once.mem - derivatives.mem - 100.0).abs() < 1e-9);
+    assert!((once.band - derivatives.band - (100.0 + 180.0)).abs() < 1e-9);
     assert_eq!((cached.proc - once.proc, cached.band - once.band), (100.0, 200.0 - 40.0));
     assert_eq!(
         visibility_buffer(&w),

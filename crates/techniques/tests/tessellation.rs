@@ -476,8 +476,16 @@ fn wrongly_stored_triangles_are_caught() {
             "colonnade",
             "lengths",
             read(
-                "unpacked_normals(uvec4(record_words(record + 9u).xyz, triangle_buffer[record + 19u]))",
-                "unpacked_normals(uvec4(record_words(record + 9u).xyz, 0x3fffffffu))",
+                "triangle_buffer[record + NORMAL_LENGTHS_WORD] = triangle_buffer[record + 19u];",
+                "triangle_buffer[record + NORMAL_LENGTHS_WORD] = 0x3fffffffu;",
+            ),
+        ),
+        (
+            "colonnade",
+            "tangents",
+            whole(
+                "packed_tangent(in_tangent_ws[k], longest)",
+                "packed_tangent(in_tangent_ws[(k + 1) % 3], 0.2)",
             ),
         ),
         ("colonnade", "side", read("& RECORD_FRONT) == 0u", "& RECORD_FRONT) != 0u")),

@@ -4,9 +4,12 @@ mod common;
 
 use std::{path::Path, sync::Arc};
 
-use afterlight_oracle::packing::unpack_normal;
+use afterlight_oracle::{
+    packing::{unpack_normal, unpack_tangent},
+    tangent::tangent_of,
+};
 use afterlight_renderer::Renderer;
-use afterlight_stages::surfaces::triangles;
+use afterlight_stages::surfaces::triangles::{self, RecordParams, Tangents};
 use afterlight_techniques::{
     Frame, Info, Params, SHADERS, SceneGpu, Settings, Technique, TechniqueError,
     cost::{Cost, Workload},
@@ -15,7 +18,10 @@ use afterlight_techniques::{
         BufferRole, Graph, ImageHandle, PassRole,
         gpu::{self, vk},
     },
-    scene::{Aabb, Camera, Instance, Material, Mesh, Scene, VertexAttributes, rng::SplitMix64},
+    scene::{
+        Aabb, Camera, Image, ImageData, Instance, Material, Mesh, Scene, TextureRef, VertexAttributes,
+        rng::SplitMix64,
+    },
     shader::Shader,
 };
 use common::{compiled, source};
@@ -25,6 +31,8 @@ use glam::{Affine3A, DMat4, DVec2, DVec3, DVec4, Vec3};
 const DRAW_TRIANGLES: usize = 1024;
 const DRAWS: usize = 977;
 const SIZE_PX: (u32, u32) = (1920, 1080);
+/// Floats that `attributes.comp` finds of a triangle.
+const FOUND: usize = 16;
 /// Half of the spacing of floats at 1.
 const U: f64 = 1.0 / 16_777_216.0;
 
@@ -106,6 +114,7 @@ impl View {
 struct Triangle {
     position_ws: [Vec3; 3],
     normal: [u32; 3],
+    tangent: [u32; 3],
     uv: [[f32; 2]; 3],
     pixel: [u32; 2],
 }
@@ -176,6 +185,9 @@ fn triangle(rng: &mut SplitMix64, class: Class, view: &View) -> Triangle {
     Triangle {
         position_ws: corners.map(|p| view.world_from_view.transform_point3(p).as_vec3()),
         normal,
+        // Another spread of the same bits: random numbers of their own would move all triangles that follow.
+        // A positive x: none of them is marked as missing, for which records pack another direction.
+        tangent: normal.map(|bits| (bits.wrapping_mul(0x9e37_79b1) ^ bits >> 15) & !0x8000),
         uv,
         pixel,
     }
@@ -187,10 +199,20 @@ fn triangles(view: &View, draws: usize, classes: &[Class]) -> Vec<Triangle> {
     (0..draws * DRAW_TRIANGLES).map(|i| triangle(&mut rng, classes[i % classes.len()], view)).collect()
 }
 
-fn scene_of(triangles: &[Triangle], view: &View) -> Scene {
+/// A scene of the triangles; with a normal map where the records are to keep tangents.
+fn scene_of(triangles: &[Triangle], view: &View, tangents: Tangents) -> Scene {
+    let flat = Image {
+        name: "flat".to_owned(),
+        data: ImageData::Rgba8 { width: 1, height: 1, pixels: Arc::from([128, 128, 255, 255]) },
+        width: 1,
+        height: 1,
+    };
+    let uv_transform = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    let normal_map = TextureRef { image: 0, sampler: Default::default(), uv_set: 0, uv_transform };
+    let keeps = tangents == Tangents::Vertices;
     let attributes = |t: &Triangle, k: usize| VertexAttributes {
         normal_os_oct: t.normal[k],
-        tangent_os_oct: 0,
+        tangent_os_oct: t.tangent[k],
         uv0: t.uv[k].map(f32::to_bits),
         uv1: [0; 2],
         color_rgba8: u32::MAX,
@@ -218,7 +240,12 @@ fn scene_of(triangles: &[Triangle], view: &View) -> Scene {
         instances: (0..triangles.len().div_ceil(DRAW_TRIANGLES) as u32)
             .map(|mesh| Instance { mesh, node: 0, world_from_object: Affine3A::IDENTITY })
             .collect(),
-        materials: vec![Material { double_sided: true, ..Material::default() }],
+        images: keeps.then_some(flat).into_iter().collect(),
+        materials: vec![Material {
+            double_sided: true,
+            normal_texture: keeps.then_some(normal_map),
+            ..Material::default()
+        }],
         cameras: vec![view.camera.clone()],
         ..Scene::default()
     }
@@ -226,8 +253,10 @@ fn scene_of(triangles: &[Triangle], view: &View) -> Scene {
 
 /// Records of all triangles, and what they give at a pixel each.
 struct Records {
-    /// Pixel of each triangle, 2 × 16 bits.
+    /// Pixel of each record's triangle, 2 × 16 bits.
     pixels: Vec<u32>,
+    /// A bit a triangle of the scene: whether it has a record.
+    bits: Vec<u32>,
 }
 
 impl Technique for Records {
@@ -242,10 +271,12 @@ impl Technique for Records {
         Cost::default()
     }
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
-        let bits = triangles::bits(graph, frame, "test", u32::MAX);
-        let triangles = triangles::store_marked(graph, frame, "test", bits, false)?;
+        let bits = frame.table(graph, "test/bits", BufferRole::TriangleSets, &self.bits)?;
+        // A scene without normal maps has the record of derivatives.
+        let triangles =
+            triangles::store_marked(graph, frame, ("test", RecordParams::default()), bits, false)?;
         let pixels = frame.table(graph, "test/pixels", BufferRole::Counters, &self.pixels)?;
-        let found = graph.buffer("test/found", BufferRole::Counters, 48 * self.pixels.len() as u64);
+        let found = graph.buffer("test/found", BufferRole::Counters, 4 * (FOUND * self.pixels.len()) as u64);
         let mut pass =
             frame.compute(graph, "test/attributes", PassRole::Upkeep, &frame.shader("test/attributes.comp")?);
         triangles.records.bind(&mut pass);
@@ -268,26 +299,38 @@ struct Stage<'a> {
     device: &'a gpu::Device,
     view: &'a View,
     triangles: Vec<Triangle>,
+    tangents: Tangents,
     uploaded: Arc<SceneGpu>,
     settings: Settings,
 }
 
 impl<'a> Stage<'a> {
-    fn new(device: &'a gpu::Device, view: &'a View, draws: usize, classes: &[Class]) -> Self {
+    fn new(
+        device: &'a gpu::Device,
+        view: &'a View,
+        draws: usize,
+        classes: &[Class],
+        tangents: Tangents,
+    ) -> Self {
         let triangles = triangles(view, draws, classes);
-        let scene = scene_of(&triangles, view);
+        let scene = scene_of(&triangles, view, tangents);
         let uploaded = SceneGpu::upload(device, &scene, &|_, _| {}).unwrap_or_else(|e| panic!("{e}"));
         let settings = Settings::for_scene(&scene, SIZE_PX.0, SIZE_PX.1);
-        Self { device, view, triangles, uploaded, settings }
+        Self { device, view, triangles, tangents, uploaded, settings }
     }
 
     /// Errors with the derivative pass as it is, or with parts of its text replaced.
     fn errors(&self, mutant: &[(&str, &str)]) -> ByClass {
-        errors(self.view, &self.triangles, &self.on_device(mutant))
+        errors(self.view, &self.triangles, self.tangents, &self.on_device(mutant))
     }
 
-    /// What the device finds, twelve floats a triangle.
+    /// What the device finds of all triangles, [`FOUND`] floats each.
     fn on_device(&self, mutant: &[(&str, &str)]) -> Vec<f32> {
+        self.on_device_of(&vec![u32::MAX; self.triangles.len() / 32], mutant)
+    }
+
+    /// What the device finds of the triangles whose bits are set, a multiple of 128 of them, in their order.
+    fn on_device_of(&self, bits: &[u32], mutant: &[(&str, &str)]) -> Vec<f32> {
         let tests = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests");
         let mut renderer = Renderer::with_scene(self.device, self.uploaded.clone(), &self.settings)
             .unwrap_or_else(|e| panic!("{e}"));
@@ -296,8 +339,9 @@ impl<'a> Stage<'a> {
             compiled("test/attributes.comp", &tests.join("attributes.comp.glsl"), &[], &[]),
             compiled(name, &source(&format!("{name}.glsl")), &[], mutant),
         ]);
-        let technique =
-            Records { pixels: self.triangles.iter().map(|t| t.pixel[0] | t.pixel[1] << 16).collect() };
+        let is_set = |i: &usize| bits[i / 32] >> (i % 32) & 1 != 0;
+        let pixels = (0..self.triangles.len()).filter(is_set).map(|i| self.triangles[i].pixel);
+        let technique = Records { pixels: pixels.map(|[x, y]| x | y << 16).collect(), bits: bits.to_vec() };
         let mut prepared = renderer.prepare(&technique, &Params::default()).unwrap_or_else(|e| panic!("{e}"));
         // Preparing has run the frame that has room for all.
         let bytes = prepared.executor().read_buffer("test/found").unwrap_or_else(|e| panic!("{e}"));
@@ -469,20 +513,20 @@ impl Errors {
     }
 }
 
-const ATTRIBUTES: [&str; 5] =
-    ["position", "normal", "texture coordinates", "the same, pixels", "their changes"];
+const ATTRIBUTES: [&str; 6] =
+    ["position", "normal", "texture coordinates", "the same, pixels", "their changes", "tangent and sign"];
 
 type ByClass = [[Errors; ATTRIBUTES.len()]; CLASSES.len()];
 
 /// Errors by class and attribute. Positions: over the distance to the eye; normals and texture coordinates: over the range of the
 /// attribute's values at the vertices; changes: over their magnitude.
-fn errors(view: &View, triangles: &[Triangle], found: &[f32]) -> ByClass {
+fn errors(view: &View, triangles: &[Triangle], tangents: Tangents, found: &[f32]) -> ByClass {
     let mut errors = [[Errors::default(); ATTRIBUTES.len()]; CLASSES.len()];
     let eye_ws = view.camera.eye_ws().as_dvec3();
-    for (index, (t, found)) in triangles.iter().zip(found.chunks_exact(12)).enumerate() {
+    for (index, (t, found)) in triangles.iter().zip(found.chunks_exact(FOUND)).enumerate() {
         let Some(oracle) = Oracle::new(view, t) else { continue };
         let found: Vec<f64> = found.iter().map(|f| f64::from(*f)).collect();
-        let [position, normal, uv, shift, changes] = &mut errors[index % CLASSES.len()];
+        let [position, normal, uv, shift, changes, tangent] = &mut errors[index % CLASSES.len()];
         let (p, slack) = oracle.position(t, eye_ws);
         position.add(p.distance(DVec3::new(found[0], found[1], found[2])), p.distance(eye_ws), slack);
         let normals = t.normal.map(unpack_normal);
@@ -490,6 +534,17 @@ fn errors(view: &View, triangles: &[Triangle], found: &[f32]) -> ByClass {
             let a = normals.map(|n| n[axis]);
             let exact = oracle.value(a, UNPACKED);
             normal.add((found[3 + axis] - exact.value).abs(), range(a), exact.slack);
+        }
+        if tangents == Tangents::Vertices {
+            let tangents = [0, 1, 2].map(|k| {
+                let (tangent, sign) = unpack_tangent(t.tangent[k]);
+                tangent_of(normals[k], tangent).extend(sign)
+            });
+            for axis in 0..4 {
+                let a = tangents.map(|t| t[axis]);
+                let exact = oracle.value(a, UNPACKED);
+                tangent.add((found[12 + axis] - exact.value).abs(), range(a).max(1e-3), exact.slack);
+            }
         }
         for axis in 0..2 {
             let a = t.uv.map(|uv| f64::from(uv[axis]));
@@ -551,19 +606,69 @@ const SIGN_SWAPPED: (&str, &str) = ("by * (inverse_det * pixel_ndc.y)", "by * (i
 /// Most that errors may be of what rounding may do, and most of their mean: measured 1.9 and 0.13 on lavapipe.
 const MAX_SHARES: (f64, f64) = (3.0, 0.2);
 
-#[test]
-fn attributes_of_a_million_triangles_agree_with_f64() {
+fn agrees_with_f64(tangents: Tangents, draws: usize) {
     let gpu = afterlight_testkit::gpu();
     let view = View::new();
-    let stage = Stage::new(&gpu, &view, DRAWS, &CLASSES);
+    let stage = Stage::new(&gpu, &view, draws, &CLASSES, tangents);
     let found = stage.errors(&[]);
-    print("as it is", &found);
+    print(&format!("{tangents:?}"), &found);
+    // The last attribute is the tangent.
+    let attributes = ATTRIBUTES.len() - usize::from(tangents == Tangents::Derivatives);
+    let least = 100.0 * draws as f64;
     for (class, errors) in CLASSES.iter().zip(&found) {
         let (max, mean) = shares(errors);
-        assert!(max < MAX_SHARES.0, "{class:?}: {max} of what rounding may do");
-        assert!(mean < MAX_SHARES.1, "{class:?}: {mean} of what rounding may do on average");
-        assert!(errors.iter().all(|e| e.count > 100_000.0), "{class:?}");
+        assert!(max < MAX_SHARES.0, "{tangents:?}, {class:?}: {max} of what rounding may do");
+        assert!(mean < MAX_SHARES.1, "{tangents:?}, {class:?}: {mean} of what rounding may do on average");
+        assert!(errors[..attributes].iter().all(|e| e.count > least), "{tangents:?}, {class:?}");
     }
+}
+
+#[test]
+fn attributes_of_a_million_triangles_agree_with_f64() {
+    agrees_with_f64(Tangents::Derivatives, DRAWS);
+}
+
+/// Records that keep tangents, of a quarter of a million triangles.
+#[test]
+fn tangents_and_normals_of_vertices_agree_with_f64() {
+    agrees_with_f64(Tangents::Vertices, DRAWS / 4);
+}
+
+/// Draws of [`sparse_bits`]: four blocks and a part of a fifth.
+const SPARSE_DRAWS: usize = 130;
+
+/// Bits of which whole blocks have none, and two others 640 each: at the ends of blocks and words, and at random.
+fn sparse_bits() -> Vec<u32> {
+    const WORDS_A_BLOCK: usize = 1024;
+    let mut rng = SplitMix64::new(3);
+    let mut bits = vec![0u32; SPARSE_DRAWS * DRAW_TRIANGLES / 32];
+    for block in [1, 3] {
+        let words = &mut bits[block * WORDS_A_BLOCK..][..WORDS_A_BLOCK];
+        (words[0], words[7], words[WORDS_A_BLOCK - 1]) = (0x8000_0001, u32::MAX, 0xc000_0000);
+        while words.iter().map(|w| w.count_ones()).sum::<u32>() < 640 {
+            let place = (rng.next_u64() % (32 * WORDS_A_BLOCK as u64)) as usize;
+            words[place / 32] |= 1 << (place % 32);
+        }
+    }
+    bits
+}
+
+/// A record is found for each bit that is set, whatever bits are not: the place of a triangle and the triangle of a place.
+#[test]
+fn sparse_bits_lead_to_their_triangles() {
+    let gpu = afterlight_testkit::gpu();
+    let view = View::new();
+    let stage = Stage::new(&gpu, &view, SPARSE_DRAWS, &[Class::Front], Tangents::Derivatives);
+    let bits = sparse_bits();
+    let is_set = |i: &usize| bits[i / 32] >> (i % 32) & 1 != 0;
+    let all = stage.on_device(&[]);
+    let expected: Vec<f32> =
+        (0..stage.triangles.len()).filter(is_set).flat_map(|i| all[i * FOUND..][..FOUND].to_vec()).collect();
+    assert_eq!(expected.len(), 1280 * FOUND);
+    assert!(stage.on_device_of(&bits, &[]) == expected, "records of other triangles");
+    // The triangle after the one that stands there.
+    let off = [("visible_triangle(index)", "visible_triangle(index) ^ 1u")];
+    assert!(stage.on_device_of(&bits, &off) != expected, "records of other triangles go unseen");
 }
 
 /// What the comparison sees: a sign, and the paper's extrapolation to the image's centre, which gives far and narrow triangles
@@ -572,7 +677,7 @@ fn attributes_of_a_million_triangles_agree_with_f64() {
 fn other_records_are_caught() {
     let gpu = afterlight_testkit::gpu();
     let view = View::new();
-    let stage = Stage::new(&gpu, &view, 64, &CLASSES);
+    let stage = Stage::new(&gpu, &view, 64, &CLASSES, Tangents::Derivatives);
     let caught = |what: &str, mutant: &[(&str, &str)], classes: &[Class]| {
         let found = stage.errors(mutant);
         print(what, &found);
@@ -592,8 +697,39 @@ fn other_records_are_caught() {
 fn triangles_edge_on_give_numbers() {
     let gpu = afterlight_testkit::gpu();
     let view = View::new();
-    let stage = Stage::new(&gpu, &view, 8, &[Class::EdgeOn]);
-    let not_finite = |mutant| stage.on_device(mutant).iter().filter(|f| !f.is_finite()).count();
-    assert_eq!(not_finite(&[]), 0);
-    assert!(not_finite(&[NEVER_FLAT]) > 0, "infinite records go unseen");
+    for tangents in [Tangents::Derivatives, Tangents::Vertices] {
+        let stage = Stage::new(&gpu, &view, 8, &[Class::EdgeOn], tangents);
+        let not_finite = |mutant| stage.on_device(mutant).iter().filter(|f| !f.is_finite()).count();
+        assert_eq!(not_finite(&[]), 0);
+        assert!(not_finite(&[NEVER_FLAT]) > 0, "infinite records go unseen");
+    }
+}
+
+/// The derivative pass starts a thread for each triangle that shows, in whole groups, and counting a group for each 32 draws, whatever the
+/// scene has besides.
+#[test]
+fn no_more_threads_start_than_triangles_show() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = common::Stage::new(&gpu, "builtin:colonnade?triangles=60000");
+    let draws = stage.uploaded.draw_count() as u64;
+    for (id, samples) in [("dais", 1), ("dais-list", 4)] {
+        let settings = Settings { samples, ..stage.settings((160, 90), 0) };
+        let mut prepared = stage.prepare(find(id).expect("known"), &settings);
+        let report = prepared.run().unwrap_or_else(|e| panic!("{e}"));
+        let counters = prepared.counters().unwrap_or_else(|e| panic!("{e}"));
+        let shown = u64::from(counters.iter().find(|c| c.name == "triangles").expect("counted").needed);
+        let threads = |pass: &str| {
+            let pass = report.pass(&format!("{id}/{pass}")).unwrap_or_else(|| panic!("found no pass {pass}"));
+            pass.statistics.map(|counted| counted.compute_invocations)
+        };
+        let Some(found) = threads("derivatives") else {
+            println!("skipped: {} counts no invocations", gpu.info().name);
+            return;
+        };
+        println!("{id}: {found} threads for {shown} triangles of {} draws", draws);
+        assert!(shown > 500 && shown < stage.scene.triangle_count() / 2, "{id}: {shown} triangles show");
+        assert_eq!(found, shown.next_multiple_of(128), "{id}");
+        assert_eq!(threads("count"), Some(256 * draws.div_ceil(32)), "{id}");
+        assert_eq!(threads("scan"), Some(256), "{id}");
+    }
 }

@@ -448,7 +448,9 @@ fn count_pairs(session: &Session, setup: &Setup) -> Result<RunResult, LabError> 
 
 /// Lit pairs of a frame: those of the first exact technique at the fewest samples.
 fn lit_pairs(setups: &[Setup], pairs: &[Option<Pairs>]) -> Option<f64> {
-    let exact = |setup: &Setup| matches!(setup.chosen.technique.info().exactness, Exactness::Exact { .. });
+    let exact = |setup: &Setup| {
+        matches!(setup.chosen.technique.exactness(&setup.chosen.params), Exactness::Exact { .. })
+    };
     let counted = setups.iter().zip(pairs).filter(|(setup, _)| exact(setup));
     let counted = counted.filter_map(|(setup, pairs)| Some((setup.samples, (*pairs)?.lit)));
     counted.min_by_key(|(samples, _)| *samples).map(|(_, lit)| lit)
@@ -457,7 +459,9 @@ fn lit_pairs(setups: &[Setup], pairs: &[Option<Pairs>]) -> Option<f64> {
 /// Marks exact techniques as failed that light fewer pairs than others of as many samples: some of their lights are lost, to a bound of the
 /// device or of their lists.
 fn judge_lit(setups: &[Setup], results: &mut [RunResult], pairs: &[Option<Pairs>]) {
-    let exact = |setup: &Setup| matches!(setup.chosen.technique.info().exactness, Exactness::Exact { .. });
+    let exact = |setup: &Setup| {
+        matches!(setup.chosen.technique.exactness(&setup.chosen.params), Exactness::Exact { .. })
+    };
     for (index, setup) in setups.iter().enumerate().filter(|(_, setup)| exact(setup)) {
         let Some(found) = pairs[index].filter(|_| results[index].status == Status::Ok) else { continue };
         let alike =

@@ -250,8 +250,7 @@ fn vertex_attributes(
     let sign = if determinant < 0.0 { -1.0 } else { 1.0 };
     let along_u = (d[0] * uv_t.y - d[1] * uv_s.y) * sign;
     let along_v = (d[1] * uv_s.x - d[0] * uv_t.x) * sign;
-    let tangent_os =
-        (along_u - normal_os * normal_os.dot(along_u)).normalize_or(normal_os.any_orthonormal_vector());
+    let tangent_os = (along_u - normal_os * normal_os.dot(along_u)).normalize_or_zero();
     // glTF: v runs downwards, the bitangent upwards
     let handedness = if normal_os.cross(tangent_os).dot(along_v) > 0.0 { -1.0 } else { 1.0 };
     VertexAttributes::pack(

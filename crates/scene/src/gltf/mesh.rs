@@ -332,7 +332,7 @@ impl Unpacked {
             .map(|i| {
                 let uv = |set: usize| self.uv[set].get(i).map_or(Vec2::ZERO, |&v| v.into());
                 let normal_os = self.normals_os.get(i).map_or(Vec3::Z, |&n| n.into());
-                let tangent = self.tangents_os.get(i).map_or(Vec4::new(1.0, 0.0, 0.0, 1.0), |&t| t.into());
+                let tangent = self.tangents_os.get(i).map_or(Vec4::W, |&t| t.into());
                 let color = self.colors.get(i).copied().unwrap_or([1.0; 4]);
                 VertexAttributes::pack(normal_os, tangent.truncate(), tangent.w, uv(0), uv(1), color)
             })

@@ -71,6 +71,9 @@ void store_vertices(uint record) {
         triangle_buffer[record + 9u + i] = vertex_normals[i];
         for (uint c = 0u; c < 2u; ++c) {
             store_float(record + 12u + 2u * i + c, vertex_uv0_uv1[i][c]);
+            if (TANGENTS != TANGENTS_BY_DERIVATIVES) {
+                triangle_buffer[record + TANGENT_WORD + 2u * i + c] = vertex_tangents[i][c];
+            }
             if (HAS_UV1 != 0u) {
                 store_float(record + UV1_WORD + 2u * i + c, vertex_uv0_uv1[i][2u + c]);
             }

@@ -30,7 +30,7 @@ use afterlight_stages::{
     surfaces::{
         compute_raster::{ComputeRasterParams, Visibility},
         shade,
-        triangles::{self, Records},
+        triangles::{self, RecordParams, Records, Tangents},
         visible::NO_TRIANGLE_RGBA8,
         visible::Visible,
     },
@@ -79,9 +79,10 @@ impl Cache {
 
     /// Specialization constants of `dais/memoize.glsl`.
     pub fn constants(&self, list: &triangles::List) -> Vec<(String, u32)> {
-        [("TRIANGLE_CAPACITY", list.capacity), ("CACHE_BUCKETS", self.buckets), ("POLLS", POLLS)]
-            .map(|(name, value)| (name.to_owned(), value))
-            .to_vec()
+        let mut constants = list.constants();
+        let own = [("CACHE_BUCKETS", self.buckets), ("POLLS", POLLS)];
+        constants.extend(own.map(|(name, value)| (name.to_owned(), value)));
+        constants
     }
 
     /// Binds it to the pass whose fragments store triangles.
@@ -140,18 +141,34 @@ impl Technique for Dais {
 
     fn predict(&self, workload: &Workload, params: &Params) -> Cost {
         match params.typed::<FillParams>().fill {
-            Fill::Cache => cost::dais_cached(workload),
-            Fill::Auto | Fill::Resolve => cost::dais(workload),
+            Fill::Cache => cost::dais_cached(workload, params.typed::<RecordParams>().floats()),
+            Fill::Auto | Fill::Resolve => cost::dais(workload, params.typed::<RecordParams>().floats()),
         }
+    }
+
+    fn exactness(&self, params: &Params) -> Exactness {
+        exactness(INFO.exactness, params)
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let params = frame.params.typed::<DaisParams>();
         let lights = params.light_step().method(frame);
         let asked = Asked { technique: INFO.id, lights, rate: None };
-        record(graph, frame, &asked, (params.fill, params.raster))
+        record(graph, frame, &asked, (params.fill, params.record, params.raster))
     }
 }
+
+/// Exactness of a technique of this family with parameters: `usual`, but for tangents that are found from derivatives.
+pub(crate) fn exactness(usual: Exactness, params: &Params) -> Exactness {
+    match params.typed::<RecordParams>().tangents {
+        Tangents::Vertices => usual,
+        Tangents::Derivatives => Exactness::Approximate { bound: DERIVATIVES_BOUND, min_psnr_db: DERIVATIVES_MIN_PSNR_DB },
+    }
+}
+
+const DERIVATIVES_BOUND: &str =
+    "normal maps are turned where texture coordinates bend, have no area or are not those of the file's tangents";
+const DERIVATIVES_MIN_PSNR_DB: f64 = 10.0;
 
 /// How a technique of this family shades what it has found.
 pub(crate) struct Asked {
@@ -171,13 +188,13 @@ pub(crate) fn record(
     graph: &mut Graph,
     frame: &Frame<'_>,
     asked: &Asked,
-    (fill, raster): (FillParams, ComputeRasterParams),
+    (fill, records, raster): (FillParams, RecordParams, ComputeRasterParams),
 ) -> Result<ImageHandle, TechniqueError> {
     if is_cached(frame, asked.technique, fill.fill, raster.visibility)? {
-        return record_cached(graph, frame, asked, fill);
+        return record_cached(graph, frame, asked, (fill, records));
     }
     let visible = Visible::find(graph, frame, asked.technique, raster, frame.samples)?;
-    let triangles = triangles::fill(graph, frame, asked.technique, &visible)?;
+    let triangles = triangles::fill(graph, frame, asked.technique, records, &visible)?;
     let tag = visible.tag_after("");
     let bind = |pass: &mut dyn SourceSlots| {
         visible.bind(frame, pass);
@@ -261,7 +278,7 @@ fn record_cached(
     graph: &mut Graph,
     frame: &Frame<'_>,
     asked: &Asked,
-    params: FillParams,
+    (params, records): (FillParams, RecordParams),
 ) -> Result<ImageHandle, TechniqueError> {
     let technique = asked.technique;
     let wide = is_wide(frame, params.reference_bits);
@@ -272,7 +289,7 @@ fn record_cached(
     let depth =
         graph.image(&name("depth"), BufferRole::Depth, frame.multisampled_info(vk::Format::D32_SFLOAT));
     let cache = Cache::new(graph, technique, params.cache);
-    let list = triangles::List::new(graph, frame, technique, REFERENCES_MAX)?;
+    let list = triangles::List::new(graph, frame, technique, records, REFERENCES_MAX)?;
     let tags = if wide { &["wide"][..] } else { &[] };
     let depth_only = depth_surfaces(frame)?;
     let mut fill = FillPass::new(graph, frame, technique, "dais/fill.frag", tags)?;

@@ -20,7 +20,11 @@ use afterlight_stages::{
     lights::{cells, step},
     surfaces::claims,
     surfaces::shade::SurfaceSource,
-    surfaces::{claims::NOT_TAKEN, depth_first::FIRST_FRAGMENT, triangles},
+    surfaces::{
+        claims::NOT_TAKEN,
+        depth_first::FIRST_FRAGMENT,
+        triangles::{self, RecordParams},
+    },
 };
 
 /// The technique.
@@ -78,14 +82,18 @@ impl Technique for DaisList {
         Params::of(DaisListParams::default())
     }
 
-    fn predict(&self, workload: &Workload, _: &Params) -> Cost {
-        cost::dais_list(workload)
+    fn predict(&self, workload: &Workload, params: &Params) -> Cost {
+        cost::dais_list(workload, params.typed::<RecordParams>().floats())
+    }
+
+    fn exactness(&self, params: &Params) -> Exactness {
+        dais::exactness(INFO.exactness, params)
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let params = frame.params.typed::<DaisListParams>();
         let mut lists = Lists::new(graph, frame, params.nodes)?;
-        let mut triangles = Triangles::new(graph, frame, params.cache)?;
+        let mut triangles = Triangles::new(graph, frame, params.cache, params.record)?;
         let rows = band_rows(frame, params.bands);
         // Held for one band: the next one draws over it.
         let info = ImageInfo::new(frame.small_depth_stencil_format(), frame.width_px, rows);
@@ -100,7 +108,7 @@ impl Technique for DaisList {
         let asked = Asked { technique: INFO.id, lights: params.light_step().method(frame), rate };
         let tag = if frame.tessellate_px.is_some() { "places" } else { "" };
         let source = SurfaceSource { folder: "dais_list", tag, shading_tag: None, samples: frame.samples };
-        let stored = triangles.store(graph, frame)?;
+        let stored = triangles.store(graph, frame, params.record)?;
         let bind = |pass: &mut dyn SourceSlots| {
             lists.bind(pass);
             stored.bind(pass);
@@ -189,11 +197,16 @@ enum Stored {
 }
 
 impl Triangles {
-    fn new(graph: &mut Graph, frame: &Frame<'_>, cache: CacheParams) -> Result<Self, TechniqueError> {
+    fn new(
+        graph: &mut Graph,
+        frame: &Frame<'_>,
+        cache: CacheParams,
+        records: RecordParams,
+    ) -> Result<Self, TechniqueError> {
         let most = references_max(frame.samples);
         if frame.tessellate_px.is_some() {
             let cache = Cache::new(graph, INFO.id, cache);
-            return Ok(Self::Listed { cache, list: triangles::List::new(graph, frame, INFO.id, most)? });
+            return Ok(Self::Listed { cache, list: triangles::List::new(graph, frame, INFO.id, records, most)? });
         }
         check_draws(frame.scene.draw_count() as u64, most)?;
         Ok(Self::Marked(triangles::bits(graph, frame, INFO.id, 0)))
@@ -216,10 +229,15 @@ impl Triangles {
         }
     }
 
-    fn store(self, graph: &mut Graph, frame: &Frame<'_>) -> Result<Stored, TechniqueError> {
+    fn store(
+        self,
+        graph: &mut Graph,
+        frame: &Frame<'_>,
+        records: RecordParams,
+    ) -> Result<Stored, TechniqueError> {
         Ok(match self {
             Self::Marked(bits) => {
-                Stored::Marked(triangles::store_marked(graph, frame, INFO.id, bits, false)?)
+                Stored::Marked(triangles::store_marked(graph, frame, (INFO.id, records), bits, false)?)
             }
             Self::Listed { list, .. } => Stored::Listed(list.derivatives(graph, frame, INFO.id)?),
         })

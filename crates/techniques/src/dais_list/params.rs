@@ -1,9 +1,12 @@
 //! Parameters of `dais-list`.
 
 use afterlight_frame::params::{AutoOr, parameters};
-use afterlight_stages::lights::{
-    cells::CellParams,
-    step::{LightParams, LightStepParams},
+use afterlight_stages::{
+    lights::{
+        cells::CellParams,
+        step::{LightParams, LightStepParams},
+    },
+    surfaces::triangles::RecordParams,
 };
 
 use crate::dais::{CacheParams, RateParams};
@@ -19,6 +22,8 @@ parameters! {
         bands: u32 = 2, "bands", 1..=16;
         /// The cache through which fragments store triangles.
         ..cache: CacheParams;
+        /// What is stored of a triangle.
+        ..record: RecordParams;
         /// At what rate indirect light is shaded.
         ..rate: RateParams = RateParams::FULL;
         /// How cells divide the view.

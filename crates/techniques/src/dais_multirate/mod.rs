@@ -12,7 +12,7 @@ use crate::dais::{self, Asked, LowRate};
 use afterlight_cost::{Cost, Workload};
 use afterlight_frame::{Answers, Exactness, Frame, Info, Params, Source, Technique, TechniqueError, views};
 use afterlight_shader::Shader;
-use afterlight_stages::lights::step;
+use afterlight_stages::{lights::step, surfaces::triangles::RecordParams};
 
 /// The technique.
 pub static TECHNIQUE: DaisMultirate = DaisMultirate;
@@ -58,14 +58,18 @@ impl Technique for DaisMultirate {
         Params::of(DaisMultirateParams::default())
     }
 
-    fn predict(&self, workload: &Workload, _: &Params) -> Cost {
-        dais::cost::dais(workload)
+    fn predict(&self, workload: &Workload, params: &Params) -> Cost {
+        dais::cost::dais(workload, params.typed::<RecordParams>().floats())
+    }
+
+    fn exactness(&self, params: &Params) -> Exactness {
+        dais::exactness(INFO.exactness, params)
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let params = frame.params.typed::<DaisMultirateParams>();
         let rate = LowRate::chosen(frame, INFO.id, params.rate)?;
         let asked = Asked { technique: INFO.id, lights: params.light_step().method(frame), rate };
-        dais::record(graph, frame, &asked, (params.fill, params.raster))
+        dais::record(graph, frame, &asked, (params.fill, params.record, params.raster))
     }
 }

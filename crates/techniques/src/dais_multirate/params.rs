@@ -6,7 +6,7 @@ use afterlight_stages::{
         cells::CellParams,
         step::{LightParams, LightStepParams},
     },
-    surfaces::compute_raster::ComputeRasterParams,
+    surfaces::{compute_raster::ComputeRasterParams, triangles::RecordParams},
 };
 
 use crate::dais::{FillParams, RateParams};
@@ -20,6 +20,8 @@ parameters! {
         ..rate: RateParams;
         /// How the triangle buffer is filled.
         ..fill: FillParams;
+        /// What is stored of a triangle.
+        ..record: RecordParams;
         /// Who finds the triangles.
         ..raster: ComputeRasterParams;
         /// How cells divide the view.

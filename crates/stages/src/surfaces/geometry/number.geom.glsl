@@ -40,6 +40,7 @@ void main() {
     uint id = atomicAdd(triangle_number, 1u);
 #ifdef WHOLE_TRIANGLE
     uvec4 normals = packed_normals(in_normal_ws[0], in_normal_ws[1], in_normal_ws[2]);
+    float longest = longest_normal(in_normal_ws[0], in_normal_ws[1], in_normal_ws[2]);
 #endif
     for (int i = 0; i < 3; ++i) {
         gl_Position = gl_in[i].gl_Position;
@@ -55,6 +56,7 @@ void main() {
                 vertex_position_ws[k] = in_position_ws[k];
                 vertex_uv0_uv1[k] = in_uv0_uv1[k];
                 vertex_color[k] = in_color[k];
+                vertex_tangents[k] = packed_tangent(in_tangent_ws[k], longest);
             }
         }
 #else

@@ -53,7 +53,8 @@ void main() {
     centroid_position_ws = world;
 #endif
     normal_ws = normal_to_world(object_row0, object_row1, object_row2, mirrored, unpack_normal(packed_normal_tangent_uv.x));
-    tangent_ws = tangent_to_world(object_row0, object_row1, object_row2, mirrored, unpack_tangent(packed_normal_tangent_uv.y));
+    tangent_ws = tangent_to_world(object_row0, object_row1, object_row2, mirrored, unpack_tangent(packed_normal_tangent_uv.y),
+                                  normal_ws);
 #endif
 #endif
 }

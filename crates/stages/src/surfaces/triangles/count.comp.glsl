@@ -1,33 +1,41 @@
-// Counts the visible triangles of each draw, and those before each of its words. A thread a draw.
+// Counts the visible triangles before each word of 32, within a block of words, and those of each block. A group a block, four words a
+// thread.
 //
-// In: VisibleBits. Out: WordCounts (before each word), DrawCountsOut. Dispatch: draws / 64.
+// In: VisibleBits. Out: VisibleBeforeOut, VisibleOfBlock. Dispatch: blocks, in rows.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
-#include "scene.glsl"
+#include "group_sum.glsl"
+#include "surfaces/triangles/blocks.glsl"
 
-layout(local_size_x = 64) in;
 layout(set = 0, binding = 8, scalar) readonly buffer VisibleBits {
     uint visible_bits[];
 };
-layout(set = 0, binding = 9, scalar) writeonly buffer WordCounts {
-    uint word_counts[];
+layout(set = 0, binding = 9, scalar) writeonly buffer VisibleBeforeOut {
+    uint visible_before_out[];
 };
-layout(set = 0, binding = 10, scalar) writeonly buffer VisibleOfDraw {
-    uint visible_of_draw[];
+layout(set = 0, binding = 10, scalar) writeonly buffer VisibleOfBlock {
+    uint visible_of_block[];
 };
 layout(constant_id = 10) const uint DRAWS = 0u;
 
+const uint WORDS_A_THREAD = 4u;
+
 void main() {
-    uint draw = gl_GlobalInvocationID.x;
-    if (draw >= DRAWS) {
-        return;
+    uint block = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
+    uint first = block * BLOCK_WORDS + gl_LocalInvocationID.x * WORDS_A_THREAD;
+    uint end = min(first + WORDS_A_THREAD, DRAWS * WORDS_A_DRAW);
+    uint own = 0u;
+    for (uint word = first; word < end; ++word) {
+        own += uint(bitCount(visible_bits[word]));
     }
-    const uint WORDS = (1u << TRIANGLE_BITS) / 32u;
-    uint count = 0u;
-    for (uint w = draw * WORDS; w < (draw + 1u) * WORDS; ++w) {
-        word_counts[w] = count;
-        count += uint(bitCount(visible_bits[w]));
+    uint total;
+    uint before = sum_before(own, total);
+    for (uint word = first; word < end; ++word) {
+        visible_before_out[word] = before;
+        before += uint(bitCount(visible_bits[word]));
     }
-    visible_of_draw[draw] = count;
+    if (gl_LocalInvocationID.x == 0u && first < DRAWS * WORDS_A_DRAW) {
+        visible_of_block[block] = total;
+    }
 }

@@ -1,34 +1,34 @@
-// Writes the record of each visible triangle (Schied and Dachsbacher 2015, section 4.2 and appendix A). A thread a triangle
-// of the scene; those that do not show end at once. With LISTED a thread a stored triangle, whose ID stands in its record, or with
-// WHOLE_TRIANGLE its vertices.
+// Writes the record of each visible triangle (Schied and Dachsbacher 2015, section 4.2 and appendix A). A thread a record, which searches
+// for the triangle whose place that is. With LISTED the triangle's ID stands in its record, or with WHOLE_TRIANGLE its vertices.
 //
 // Departure: the paper clips triangles by shrinking them, since its barycentric coordinates (equations 3 and 4) need projected
 // vertices. With homogeneous ones (Olano and Greer 1997) the edge functions b_i of the clip positions are affine on the screen as
 // well, whatever lies behind the eye, and with det = sum b_i w_i it is 1/w = sum b_i / det and a/w = sum b_i a_i / det: equation 5
 // without a clip.
 //
-// In: the index, the scene. Out: TriangleBuffer; with RECORD_IDS the triangle ID of each record. Dispatch: draws x 8; LISTED: as many as size.comp.glsl says.
+// In: TriangleCount, the index, the scene. Out: TriangleBuffer; with RECORD_IDS the triangle ID of each record. Dispatch: by
+// DispatchGroups of scan.comp.glsl, with LISTED of size.comp.glsl.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "triangle.glsl"
 #include "surfaces/triangles/record.glsl"
+#include "surfaces/triangles/groups.glsl"
+#include "surfaces/geometry/packed_normals.glsl"
 #ifdef WHOLE_TRIANGLE
 #include "surfaces/triangles/vertices.glsl"
 #endif
 #ifndef LISTED
-#include "surfaces/triangles/index.glsl"
+#include "surfaces/triangles/place.glsl"
 #endif
 
 layout(local_size_x = 128) in;
 layout(set = 0, binding = 8, scalar) buffer TriangleBuffer {
     uint triangle_buffer[];
 };
-#ifdef LISTED
 layout(set = 0, binding = 10, scalar) readonly buffer TriangleCount {
     uint triangles_needed;
     uint triangles_dropped;
 };
-#endif
 #ifdef RECORD_IDS
 layout(set = 0, binding = 15, scalar) writeonly buffer RecordIds {
     uint record_ids[];
@@ -41,11 +41,6 @@ layout(set = 0, binding = 9, scalar) readonly buffer DrawCommands {
 };
 #endif
 layout(constant_id = 11) const uint TRIANGLE_CAPACITY = 0u;
-#ifndef LISTED
-layout(push_constant, scalar) uniform Push {
-    uint first_draw;
-};
-#endif
 
 // Affine functions on the screen: value at the anchor, changes a pixel.
 struct Affine {
@@ -99,6 +94,7 @@ vec2 anchor_px(vec3 c0, vec3 c1, vec3 c2) {
 struct TriangleVertices {
     mat3 position_ws;
     mat3 normal_ws;     // their lengths are weights
+    mat3x4 tangent_ws;  // TANGENTS_OF_VERTICES; w: the bitangent's sign
     mat3x2 uv0;
     mat3x2 uv1;         // where the scene has them
     mat3x4 color;       // where the scene has them
@@ -122,6 +118,7 @@ TriangleVertices stored_vertices(uint record) {
         t.position_ws[i] = uintBitsToFloat(record_words(record + 3u * i).xyz);
     }
     t.normal_ws = unpacked_normals(uvec4(record_words(record + 9u).xyz, triangle_buffer[record + 19u]));
+    t.tangent_ws = mat3x4(0.0);     // they stay where they are
     t.uv0 = stored_uv(record + 12u);
     t.uv1 = HAS_UV1 != 0u ? stored_uv(record + UV1_WORD) : t.uv0;
     t.color = mat3x4(1.0);
@@ -146,7 +143,8 @@ TriangleVertices fetched_vertices(uint draw, uint triangle) {
     t.color = mat3x4(1.0);
     for (uint i = 0u; i < 3u; ++i) {
         t.position_ws[i] = load_position(d, v[i]);
-        t.normal_ws[i] = normal_to_world(d.object_row0, d.object_row1, d.object_row2, t.turned, unpack_normal(attributes[a[i]]));
+        t.normal_ws[i] = load_normal(d, a[i]);
+        t.tangent_ws[i] = TANGENTS == TANGENTS_OF_VERTICES ? load_tangent(d, a[i], t.normal_ws[i]) : vec4(0.0);
         t.uv0[i] = load_uv(a[i], 2u);
         t.uv1[i] = HAS_UV1 != 0u ? load_uv(a[i], 4u) : t.uv0[i];
         if (HAS_VERTEX_COLOR != 0u) {
@@ -183,6 +181,27 @@ void store_uv(uint word, Basis basis, mat3x2 uv) {
     }
 }
 
+// Normals by their changes, or weights of vertices with the normals and tangents of those.
+void store_frame(uint record, Basis basis, TriangleVertices t) {
+    if (TANGENTS == TANGENTS_BY_DERIVATIVES) {
+        for (uint i = 0u; i < 3u; ++i) {
+            store(record + 3u + 3u * i, affine(basis, vec3(t.normal_ws[0][i], t.normal_ws[1][i], t.normal_ws[2][i])));
+        }
+        return;
+    }
+    store(record + 3u, Affine(basis.at.y, basis.dx.y, basis.dy.y));
+    store(record + 6u, Affine(basis.at.z, basis.dx.z, basis.dy.z));
+#ifdef WHOLE_TRIANGLE
+    // Directions and tangents are where fragments have stored them; lengths make room for the anchor.
+    triangle_buffer[record + NORMAL_LENGTHS_WORD] = triangle_buffer[record + 19u];
+#else
+    for (uint i = 0u; i < 3u; ++i) {
+        triangle_buffer[record + 9u + i] = packed_direction(t.normal_ws[i]);
+        triangle_buffer[record + TANGENT_WORD + i] = pack_tangent(t.tangent_ws[i]);
+    }
+#endif
+}
+
 void store_record(uint record, TriangleVertices t) {
     mat3 p = t.position_ws;
     vec3 c0 = clip_xyw(p[0]), c1 = clip_xyw(p[1]), c2 = clip_xyw(p[2]);
@@ -202,9 +221,7 @@ void store_record(uint record, TriangleVertices t) {
                     dot(frame.distance_from_world, vec4(p[2], 1.0)));
     }
     store(record, affine(basis, of_w));
-    for (uint i = 0u; i < 3u; ++i) {
-        store(record + 3u + 3u * i, affine(basis, vec3(t.normal_ws[0][i], t.normal_ws[1][i], t.normal_ws[2][i])));
-    }
+    store_frame(record, basis, t);
     store_uv(record + 12u, basis, t.uv0);
     triangle_buffer[record + 18u] = t.material | (front ? RECORD_FRONT : 0u);
     triangle_buffer[record + 19u] = uint(anchor.x) | uint(anchor.y) << 16;
@@ -219,35 +236,22 @@ void store_record(uint record, TriangleVertices t) {
 }
 
 void main() {
-#ifdef LISTED
-    uint index = gl_GlobalInvocationID.x;
+    uint index = (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * GROUP_TRIANGLES + gl_LocalInvocationID.x;
     if (index >= min(triangles_needed, TRIANGLE_CAPACITY)) {
         return;
     }
-#else
-    uint draw_slot = first_draw + gl_WorkGroupID.x;
-    uint triangle = gl_WorkGroupID.y * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
-    uint id = draw_slot << TRIANGLE_BITS | triangle;
-    if (!is_visible(id)) {
-        return;
-    }
-    uint index = triangle_index(id);
-    if (index >= TRIANGLE_CAPACITY) {
-        return;
-    }
-#endif
     uint record = index * RECORD_WORDS;
 #ifdef WHOLE_TRIANGLE
     store_record(record, stored_vertices(record));
 #else
 #ifdef LISTED
     uint id = triangle_buffer[record];
-    uint draw_slot = id >> TRIANGLE_BITS, triangle = id & ((1u << TRIANGLE_BITS) - 1u);
-#endif
-#ifdef SAMPLES_IN_KEYS
-    uint draw = draw_commands[draw_slot * 5u + 4u];
 #else
-    uint draw = draw_slot;
+    uint id = visible_triangle(index);
+#endif
+    uint draw = id >> TRIANGLE_BITS, triangle = id & ((1u << TRIANGLE_BITS) - 1u);
+#ifdef SAMPLES_IN_KEYS
+    draw = draw_commands[draw * 5u + 4u];
 #endif
 #ifdef RECORD_IDS
     record_ids[index] = draw << TRIANGLE_BITS | triangle;

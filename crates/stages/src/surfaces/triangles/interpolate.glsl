@@ -3,6 +3,7 @@
 #ifndef AFTERLIGHT_INTERPOLATE
 #define AFTERLIGHT_INTERPOLATE
 #include "surfaces/triangles/record.glsl"
+#include "surfaces/geometry/packed_normals.glsl"
 
 layout(set = 0, binding = 20, scalar) readonly buffer TriangleBuffer {
     uint triangle_buffer[];
@@ -44,7 +45,56 @@ vec4 tangent_from_changes(vec3 normal_ws, vec3 dp_dx, vec3 dp_dy, TextureCoordin
     vec3 along_v = (dp_dy * at.ddx.x - dp_dx * at.ddy.x) * sign(det);
     vec3 n = unit_or_zero(normal_ws);
     vec3 tangent = unit_or_zero(along_u - n * dot(n, along_u));
+    // Texture coordinates that do not change along the surface leave nothing.
+    if (dot(tangent, tangent) < 0.5) {
+        return vec4(fallback_tangent(n), 1.0);
+    }
     return vec4(tangent, dot(cross(n, tangent), along_v) < 0.0 ? 1.0 : -1.0);
+}
+
+// Normal and tangent where tangents are kept: those of the vertices, weighted.
+void interpolate_frame(uint record, vec2 from_anchor_px, float w, inout SurfacePoint p) {
+    vec3 weights;
+    weights.y = record_affine(record + 3u, from_anchor_px).x * w;
+    weights.z = record_affine(record + 6u, from_anchor_px).x * w;
+    weights.x = 1.0 - weights.y - weights.z;
+    uvec3 normals = uvec3(triangle_buffer[record + 9u], triangle_buffer[record + 10u], triangle_buffer[record + 11u]);
+    p.tangent_ws = vec4(0.0);
+    if (TANGENTS == TANGENTS_WEIGHTED) {
+        p.normal_ws = unpacked_normals(uvec4(normals, triangle_buffer[record + NORMAL_LENGTHS_WORD])) * weights;
+        for (uint i = 0u; i < 3u; ++i) {
+            uint word = record + TANGENT_WORD + 2u * i;
+            p.tangent_ws += weights[i] * unpacked_tangent(uvec2(triangle_buffer[word], triangle_buffer[word + 1u]));
+        }
+    } else {
+        p.normal_ws = mat3(unpack_normal(normals.x), unpack_normal(normals.y), unpack_normal(normals.z)) * weights;
+        for (uint i = 0u; i < 3u; ++i) {
+            p.tangent_ws += weights[i] * unpack_tangent(triangle_buffer[record + TANGENT_WORD + i]);
+        }
+    }
+}
+
+// Normal and tangent where the record has changes of the normal alone (Schied and Dachsbacher 2015, section 4.3). `p` has position and
+// texture coordinates; the tangent follows the set that the material's normal map is seen through.
+void find_frame(uint record, vec2 from_anchor_px, vec2 pixel_center, float w, uint material, inout SurfacePoint p) {
+    p.normal_ws = vec3(record_affine(record + 3u, from_anchor_px).x, record_affine(record + 6u, from_anchor_px).x,
+                       record_affine(record + 9u, from_anchor_px).x) * w;
+    p.tangent_ws = vec4(0.0);
+    if (NORMAL_BUCKETS > 0u) {
+        vec3 first_words = record_affine(record, from_anchor_px);
+        // A step on the screen at one distance, then along the ray by the change of the distance. Not the difference to the position a pixel
+        // on, which of a triangle seen at a flat angle may lie beyond the horizon of its plane.
+        bool orthographic = frame.eye_ws.w == 0.0;
+        vec3 ray = orthographic ? frame.distance_from_world.xyz : (frame.eye_ws.xyz - p.position_ws) / first_words.x;
+        vec3 dp_dx = interpolated_position(first_words, pixel_center + vec2(1.0, 0.0)) - p.position_ws + ray * first_words.y;
+        vec3 dp_dy = interpolated_position(first_words, pixel_center + vec2(0.0, 1.0)) - p.position_ws + ray * first_words.z;
+        bool second_set = HAS_UV1 != 0u && (load_material(material).normal_slot & (1u << 24)) != 0u;
+        TextureCoordinates at = p.uv0;
+        if (second_set) {
+            at = p.uv1;
+        }
+        p.tangent_ws = tangent_from_changes(p.normal_ws, dp_dx, dp_dy, at);
+    }
 }
 
 // First word of a record. In a frame that has more triangles than room, which is recorded again, those without a place show the
@@ -79,8 +129,6 @@ SurfacePoint interpolated_point(uint index, vec2 pixel, out uint material) {
     SurfacePoint p;
     p.position_ws = interpolated_position(first_words, center);
     p.front_facing = (triangle_buffer[record + 18u] & RECORD_FRONT) != 0u;
-    p.normal_ws = vec3(record_affine(record + 3u, from_anchor).x, record_affine(record + 6u, from_anchor).x,
-                       record_affine(record + 9u, from_anchor).x) * w;
     p.uv0 = interpolated_uv(record + 12u, from_anchor, inverse_w, w);
     p.uv1 = HAS_UV1 != 0u ? interpolated_uv(record + UV1_WORD, from_anchor, inverse_w, w) : p.uv0;
     p.color = vec4(1.0);
@@ -89,13 +137,10 @@ SurfacePoint interpolated_point(uint index, vec2 pixel, out uint material) {
             p.color[i] = record_affine(record + COLOR_WORD + 3u * i, from_anchor).x * w;
         }
     }
-    p.tangent_ws = vec4(0.0);
-    if (NORMAL_BUCKETS > 0u) {
-        vec3 right = record_affine(record, from_anchor + vec2(1.0, 0.0));
-        vec3 below = record_affine(record, from_anchor + vec2(0.0, 1.0));
-        vec3 dp_dx = interpolated_position(right, center + vec2(1.0, 0.0)) - p.position_ws;
-        vec3 dp_dy = interpolated_position(below, center + vec2(0.0, 1.0)) - p.position_ws;
-        p.tangent_ws = tangent_from_changes(p.normal_ws, dp_dx, dp_dy, p.uv0);
+    if (TANGENTS == TANGENTS_BY_DERIVATIVES) {
+        find_frame(record, from_anchor, center, w, material, p);
+    } else {
+        interpolate_frame(record, from_anchor, w, p);
     }
     return p;
 }

@@ -10,21 +10,86 @@ use afterlight_graph::{BufferHandle, BufferRole, ComputePass, Graph, PassRole, R
 
 use crate::surfaces::visible::Visible;
 use afterlight_frame::{
-    Frame, Slots, TechniqueError,
+    Frame, SourceSlots, TechniqueError,
     capacity::{self, FIRST_GUESS},
+    params::{choices, parameters},
     scene::DRAW_TRIANGLES,
-    views,
+    set_constants, views,
 };
 
 /// Words of 32 bits for a draw's triangles.
 const WORDS_A_DRAW: u64 = DRAW_TRIANGLES as u64 / 32;
-/// Triangles of a group: `local_size_x` in `derivatives.comp.glsl`.
-const GROUP_TRIANGLES: u32 = 128;
+/// Draws whose bits a group counts: `BLOCK_WORDS` in `blocks.glsl`, in draws.
+const BLOCK_DRAWS: u32 = 32;
+/// Most groups in a row of a dispatch: every device takes 65,535.
+const ROW_GROUPS: u32 = 1 << 15;
+
+choices! {
+    /// Where shading of normal maps has tangents from.
+    pub enum Tangents {
+        /// Interpolated from the vertices, as wherever else surfaces are shaded.
+        Vertices = "vertices",
+        /// Found from screen-space derivatives of position and texture coordinates (Schied and Dachsbacher 2015, section 4.3).
+        Derivatives = "derivatives",
+    }
+}
+
+parameters! {
+    /// What is stored of a triangle.
+    #[derive(Copy)]
+    pub struct RecordParams {
+        /// where normal maps have tangents from: of the vertices, kept in the record where the scene has normal maps; or by derivatives of position and texture coordinates (the paper's), which turns normal maps where coordinates bend, have no area or do not match the file's tangents
+        tangents: Tangents = Tangents::Vertices, "tangents";
+    }
+}
+
+impl RecordParams {
+    /// Floats of a record in a scene with normal maps, without second texture coordinates and vertex colours.
+    pub fn floats(&self) -> f64 {
+        match self.tangents {
+            Tangents::Vertices => 23.0,
+            Tangents::Derivatives => 20.0,
+        }
+    }
+}
+
+/// What the records of a frame hold.
+#[derive(Clone, Copy)]
+pub struct RecordLayout {
+    /// `TANGENTS` of `record.glsl`.
+    tangents: u32,
+    /// Bytes of a record.
+    pub bytes: u64,
+}
+
+impl RecordLayout {
+    /// The layout for a frame: 80 bytes, more where the scene has normal maps and tangents are kept, second texture coordinates, or
+    /// vertex colours.
+    pub fn of(frame: &Frame<'_>, params: RecordParams) -> Self {
+        let has =
+            |name: &str| frame.scene.constants.iter().any(|(known, value)| *known == name && *value != 0);
+        let keeps = params.tangents == Tangents::Vertices && has("NORMAL_BUCKETS");
+        let (tangents, tangent_bytes) = match (keeps, frame.tessellate_px.is_some()) {
+            (false, _) => (0, 0),
+            (true, false) => (1, 12),
+            (true, true) => (2, 28),
+        };
+        let more = 24 * u64::from(has("HAS_UV1")) + 48 * u64::from(has("HAS_VERTEX_COLOR"));
+        Self { tangents, bytes: 80 + tangent_bytes + more }
+    }
+
+    /// Specialization constants of `record.glsl`.
+    pub fn constants(&self) -> [(&'static str, u32); 1] {
+        [("TANGENTS", self.tangents)]
+    }
+}
 
 /// Records of triangles.
 pub struct Records {
-    /// The records, 80 bytes each.
+    /// The records.
     pub words: BufferHandle,
+    /// What they hold.
+    pub layout: RecordLayout,
     /// Triangle ID of each record, for the views that ask for it.
     pub ids: Option<BufferHandle>,
     /// Records that there is room for.
@@ -33,8 +98,9 @@ pub struct Records {
 
 impl Records {
     /// Binds what `surfaces/triangles/interpolate.glsl` reads.
-    pub fn bind(&self, pass: &mut (impl Slots + ?Sized)) {
+    pub fn bind(&self, pass: &mut (impl SourceSlots + ?Sized)) {
         pass.read_buffer("TriangleBuffer", &self.words);
+        set_constants(pass, self.layout.constants());
     }
 }
 
@@ -49,18 +115,12 @@ pub struct TriangleBuffer {
 
 impl TriangleBuffer {
     /// Binds what `surfaces/triangles/index.glsl` and `surfaces/triangles/interpolate.glsl` read.
-    pub fn bind(&self, pass: &mut (impl Slots + ?Sized)) {
+    pub fn bind(&self, pass: &mut (impl SourceSlots + ?Sized)) {
         self.records.bind(pass);
         pass.read_buffer("VisibleBits", &self.bits);
         pass.read_buffer("VisibleBefore", &self.before);
-        pass.read_buffer("DrawBase", &self.base);
+        pass.read_buffer("BlockBase", &self.base);
     }
-}
-
-/// Bytes of a triangle's record: 80, more where the scene has second texture coordinates or vertex colours.
-fn record_bytes(frame: &Frame<'_>) -> u64 {
-    let has = |name: &str| frame.scene.constants.iter().any(|(known, value)| *known == name && *value != 0);
-    80 + 24 * u64::from(has("HAS_UV1")) + 48 * u64::from(has("HAS_VERTEX_COLOR"))
 }
 
 /// A triangle buffer that fragments append to: a triangle ID in the first word of each record or, in tessellated frames, the
@@ -68,6 +128,7 @@ fn record_bytes(frame: &Frame<'_>) -> u64 {
 pub struct List {
     records: BufferHandle,
     count: BufferHandle,
+    layout: RecordLayout,
     /// Triangles that there is room for.
     pub capacity: u32,
 }
@@ -81,9 +142,11 @@ impl List {
         graph: &mut Graph,
         frame: &Frame<'_>,
         technique: &str,
+        params: RecordParams,
         most: u32,
     ) -> Result<Self, TechniqueError> {
-        let (capacity, bytes) = room(frame, technique)?;
+        let layout = RecordLayout::of(frame, params);
+        let (capacity, bytes) = room(frame, technique, layout)?;
         if capacity > most {
             let what = format!("{technique}: triangles that a visibility sample's reference tells apart");
             return Err(TechniqueError::TooLarge { what, found: capacity.into(), limit: most.into() });
@@ -92,7 +155,14 @@ impl List {
         let count = graph.buffer(&format!("{technique}/triangle count"), BufferRole::TriangleSets, 8);
         let count =
             graph.clear_buffer(&format!("{technique}/clear count"), PassRole::TriangleSelection, count, 0);
-        Ok(Self { records, count, capacity })
+        Ok(Self { records, count, layout, capacity })
+    }
+
+    /// Specialization constants of the fragments that append to it.
+    pub fn constants(&self) -> Vec<(String, u32)> {
+        let of_layout = self.layout.constants();
+        let all = of_layout.iter().copied().chain([("TRIANGLE_CAPACITY", self.capacity)]);
+        all.map(|(name, value)| (name.to_owned(), value)).collect()
     }
 
     /// Binds it to the pass that appends.
@@ -130,6 +200,7 @@ impl List {
         let mut pass =
             frame.compute(graph, &format!("{technique}/derivatives"), PassRole::Derivatives, &shader);
         pass.constant("TRIANGLE_CAPACITY", self.capacity);
+        set_constants(&mut pass, self.layout.constants());
         pass.read("TriangleCount", &self.count);
         let words = pass.write("TriangleBuffer", self.records);
         let ids = ids.written_by(&mut pass);
@@ -138,7 +209,7 @@ impl List {
         // The triangles of tessellation are mostly small: hardly any is stored twice.
         let slack = if frame.tessellate_px.is_some() { capacity::STEADY } else { capacity::UNSTEADY };
         frame.watch_with(graph, "triangles", &self.count, self.capacity, false, slack);
-        Ok(Records { words, ids, capacity: self.capacity })
+        Ok(Records { words, layout: self.layout, ids, capacity: self.capacity })
     }
 }
 
@@ -170,9 +241,9 @@ pub fn capacity(frame: &Frame<'_>) -> u32 {
 }
 
 /// Triangles that there should be room for, and their bytes.
-fn room(frame: &Frame<'_>, technique: &str) -> Result<(u32, u64), TechniqueError> {
+fn room(frame: &Frame<'_>, technique: &str, layout: RecordLayout) -> Result<(u32, u64), TechniqueError> {
     let capacity = capacity(frame);
-    let bytes = record_bytes(frame) * u64::from(capacity);
+    let bytes = layout.bytes * u64::from(capacity);
     frame.check_binding(technique, &format!("the triangle buffer for {capacity} triangles"), bytes)?;
     Ok((capacity, bytes.max(4)))
 }
@@ -185,6 +256,7 @@ pub fn fill(
     graph: &mut Graph,
     frame: &Frame<'_>,
     technique: &str,
+    params: RecordParams,
     visible: &Visible,
 ) -> Result<TriangleBuffer, TechniqueError> {
     let name = |stage: &str| format!("{technique}/{stage}");
@@ -196,7 +268,7 @@ pub fn fill(
     let bits = pass.write("MarkedBits", bits);
     pass.dispatch(frame.groups(8));
     pass.finish();
-    store_marked(graph, frame, technique, bits, matches!(visible, Visible::Keys { .. }))
+    store_marked(graph, frame, (technique, params), bits, matches!(visible, Visible::Keys { .. }))
 }
 
 /// Draws of the scene, at least one.
@@ -219,18 +291,21 @@ pub fn bits(graph: &mut Graph, frame: &Frame<'_>, technique: &str, value: u32) -
 pub fn store_marked(
     graph: &mut Graph,
     frame: &Frame<'_>,
-    technique: &str,
+    (technique, params): (&str, RecordParams),
     bits: BufferHandle,
     by_keys: bool,
 ) -> Result<TriangleBuffer, TechniqueError> {
     let name = |stage: &str| format!("{technique}/{stage}");
     let draws = draw_count(frame);
-    let (capacity, bytes) = room(frame, technique)?;
+    let blocks = draws.div_ceil(BLOCK_DRAWS);
+    let layout = RecordLayout::of(frame, params);
+    let (capacity, bytes) = room(frame, technique, layout)?;
     let before =
         graph.buffer(&name("visible before"), BufferRole::TriangleSets, 4 * u64::from(draws) * WORDS_A_DRAW);
-    let of_draw = graph.buffer(&name("visible of draw"), BufferRole::TriangleSets, 4 * u64::from(draws));
-    let base = graph.buffer(&name("draw base"), BufferRole::TriangleSets, 4 * u64::from(draws));
+    let of_block = graph.buffer(&name("visible of block"), BufferRole::TriangleSets, 4 * u64::from(blocks));
+    let base = graph.buffer(&name("block base"), BufferRole::TriangleSets, 4 * u64::from(blocks));
     let count = graph.buffer(&name("triangle count"), BufferRole::TriangleSets, 8);
+    let groups = graph.buffer(&name("dispatch groups"), BufferRole::TriangleSets, 12);
     let words = graph.buffer(&name("triangle buffer"), BufferRole::Triangles, bytes);
 
     let mut pass = frame.compute(
@@ -241,9 +316,9 @@ pub fn store_marked(
     );
     pass.constant("DRAWS", draws);
     pass.read("VisibleBits", &bits);
-    let before = pass.write("WordCounts", before);
-    let of_draw = pass.write("VisibleOfDraw", of_draw);
-    pass.dispatch([draws.div_ceil(64), 1, 1]);
+    let before = pass.write("VisibleBeforeOut", before);
+    let of_block = pass.write("VisibleOfBlock", of_block);
+    pass.dispatch([blocks.min(ROW_GROUPS), blocks.div_ceil(ROW_GROUPS), 1]);
     pass.finish();
 
     let mut pass = frame.compute(
@@ -252,10 +327,11 @@ pub fn store_marked(
         PassRole::TriangleSelection,
         &frame.shader("surfaces/triangles/scan.comp")?,
     );
-    pass.constant("DRAWS", draws).constant("TRIANGLE_CAPACITY", capacity);
-    pass.read("VisibleOfDraw", &of_draw);
-    let base = pass.write("DrawBaseOut", base);
+    pass.constant("BLOCKS", blocks).constant("TRIANGLE_CAPACITY", capacity);
+    pass.read("VisibleOfBlock", &of_block);
+    let base = pass.write("BlockBaseOut", base);
     let count = pass.write("TriangleCount", count);
+    let groups = pass.write("DispatchGroups", groups);
     pass.dispatch([1, 1, 1]);
     pass.finish();
 
@@ -263,20 +339,18 @@ pub fn store_marked(
     let tag = if by_keys { format!("#keys{}", ids.tag('-')) } else { ids.tag('#') };
     let shader = frame.shader(&format!("surfaces/triangles/derivatives.comp{tag}"))?;
     let mut pass = frame.compute(graph, &name("derivatives"), PassRole::Derivatives, &shader);
-    pass.constant("TRIANGLE_CAPACITY", capacity);
-    pass.read("VisibleBits", &bits).read("VisibleBefore", &before).read("DrawBase", &base);
+    pass.constant("TRIANGLE_CAPACITY", capacity).constant("DRAWS", draws);
+    set_constants(&mut pass, layout.constants());
+    pass.read("TriangleCount", &count);
+    pass.read("VisibleBits", &bits).read("VisibleBefore", &before).read("BlockBase", &base);
     if by_keys {
         pass.read("DrawCommands", &frame.buffers.commands);
     }
     let words = pass.write("TriangleBuffer", words);
     let ids = ids.written_by(&mut pass);
-    let most_groups = frame.features().max_workgroup_count[0];
-    for first in (0..draws).step_by(most_groups as usize) {
-        pass.push(&[first]);
-        pass.dispatch([(draws - first).min(most_groups), DRAW_TRIANGLES / GROUP_TRIANGLES, 1]);
-    }
+    pass.dispatch_indirect(&groups, 0);
     pass.finish();
 
     frame.watch(graph, "triangles", &count, capacity, false);
-    Ok(TriangleBuffer { records: Records { words, ids, capacity }, bits, before, base })
+    Ok(TriangleBuffer { records: Records { words, layout, ids, capacity }, bits, before, base })
 }

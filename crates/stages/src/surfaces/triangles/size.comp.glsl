@@ -1,6 +1,8 @@
 // Groups for the derivative pass, from the count of triangles: no read-back. In: TriangleCount. Out: DispatchGroups. One thread.
 #version 460
+#extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
+#include "surfaces/triangles/groups.glsl"
 
 layout(local_size_x = 1) in;
 layout(set = 0, binding = 8, scalar) readonly buffer TriangleCount {
@@ -8,12 +10,10 @@ layout(set = 0, binding = 8, scalar) readonly buffer TriangleCount {
     uint triangles_dropped;
 };
 layout(set = 0, binding = 9, scalar) writeonly buffer DispatchGroups {
-    uint dispatch_groups[];
+    uvec3 dispatch_groups;
 };
 layout(constant_id = 11) const uint TRIANGLE_CAPACITY = 0u;
 
 void main() {
-    dispatch_groups[0] = (min(triangles_needed, TRIANGLE_CAPACITY) + 127u) / 128u;
-    dispatch_groups[1] = 1u;
-    dispatch_groups[2] = 1u;
+    dispatch_groups = derivative_groups(min(triangles_needed, TRIANGLE_CAPACITY));
 }

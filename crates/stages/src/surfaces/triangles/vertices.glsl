@@ -7,6 +7,10 @@
 //   word 18      material; bit 31: the front faces the eye
 //   word 19      lengths of the normals over that of the longest, 3 x 10 bits
 //
+// where tangents are kept
+//
+//   words 20-25  tangents, two words a vertex; packed_normals.glsl has the formats of normals and tangents
+//
 // then, where the scene has them, second texture coordinates, two words a vertex, and vertex colours, four.
 #ifndef AFTERLIGHT_TRIANGLE_VERTICES
 #define AFTERLIGHT_TRIANGLE_VERTICES
