@@ -432,14 +432,57 @@ mod tests {
         "caf\u{e9}",
     ];
 
+    /// Lines of both formats that say something.
+    const LINES: &[&str] = &[
+        "v 0 0 1",
+        "v 1 1 0 0.5",
+        "v 0 1 1 1 0 0",
+        "vt 0.5 0.5",
+        "vt 0.5 0.5 0.5",
+        "vn 0 1 0",
+        "o a",
+        "g a b",
+        "s off",
+        "usemtl m",
+        "usemtl n",
+        "f 1 2 3",
+        "f 1/1 2/1 3/1 1/1",
+        "f -1 -2 -3",
+        "f 1//1 2//1 3//1",
+        "f 1/1/1 2 3",
+        "l 1 2",
+        "p 1",
+        "f 1 1 1",
+        "mtllib b.mtl",
+        "newmtl m",
+        "newmtl n",
+        "Kd 0.5",
+        "Kd 1 0 0",
+        "Ke 2",
+        "d 0.5",
+        "d -halo 0.1",
+        "Tr 1",
+        "Ns 10",
+        "Ns -1",
+        "Pm 0.5",
+        "Pr 2",
+        "illum 2",
+        "Kd xyz 1 1 1",
+        "Kd 1e38 1e38 1e38",
+        "map_Kd",
+        "norm",
+    ];
+
     fn line() -> impl Strategy<Value = String> {
-        prop::collection::vec(prop::sample::select(WORDS), 0..7).prop_map(|words| words.join(" "))
+        let words =
+            prop::collection::vec(prop::sample::select(WORDS), 0..7).prop_map(|words| words.join(" "));
+        prop_oneof![3 => prop::sample::select(LINES).prop_map(str::to_owned), 1 => words]
     }
 
-    /// Lines of any words, bytes of any kind between them.
+    /// Lines right and wrong, bytes of any kind between them.
     fn text(start: &'static str) -> impl Strategy<Value = Vec<u8>> {
         let damage = prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..3);
-        (prop::collection::vec(line(), 0..12), damage).prop_map(move |(lines, damage)| {
+        (prop::collection::vec(line(), 0..10), damage).prop_map(move |(lines, damage)| {
             let mut bytes = format!("{start}{}\n", lines.join("\n")).into_bytes();
             for (at, byte) in damage {
                 let at = at.index(bytes.len());

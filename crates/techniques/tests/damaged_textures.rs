@@ -99,13 +99,16 @@ fn fails_naming(device: &gpu::Device, scene: Scene, first_bad: usize, what: &str
     assert!(error.contains("expected") && !error.contains('\n'), "{what}: {error}");
 }
 
+/// Which textures are bad, in words and by number, and the first of them.
+type BadSet<'a> = (&'a str, &'a dyn Fn(usize) -> bool, usize);
+
 #[test]
 fn any_number_of_textures_of_which_any_are_bad_end_in_an_error() {
     let gpu = afterlight_testkit::gpu();
     let (name, bad) = &damaged()[1];
     // Fewer, as many, and more than are decoded ahead; more than any machine has cores.
     for count in [1, 2, 4, 5, 6, 24, 300] {
-        let is_bad: [(&str, &dyn Fn(usize) -> bool, usize); 6] = [
+        let sets: [BadSet; 6] = [
             ("the first", &|i| i == 0, 0),
             ("the last", &|i| i == count - 1, count - 1),
             ("one in the middle", &|i| i == count / 2, count / 2),
@@ -113,7 +116,7 @@ fn any_number_of_textures_of_which_any_are_bad_end_in_an_error() {
             ("every other", &|i| i % 2 == 1, 1.min(count - 1)),
             ("all", &|_| true, 0),
         ];
-        for (which, is_bad, first) in is_bad {
+        for (which, is_bad, first) in sets {
             let scene = scene_of(count, is_bad, bad);
             if scene.images.iter().enumerate().any(|(i, _)| is_bad(i)) {
                 fails_naming(&gpu, scene, first, &format!("{which} of {count} is {name}"));
