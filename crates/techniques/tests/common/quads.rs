@@ -50,20 +50,31 @@ impl Wrap {
     }
 }
 
-/// Texels that no two channels and no two images share: bytes of SplitMix64 (Steele et al. 2014). Those of the normal map are unit
-/// vectors to within their rounding, up to 45° off the axis.
-pub fn texel_bytes(image: usize, x: usize, y: usize) -> [u8; 4] {
-    let mut z = (((image * IMAGE_SIZE + y) * IMAGE_SIZE + x) as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+/// Bytes of SplitMix64 (Steele et al. 2014).
+fn random_bytes(seed: u64) -> [u8; 8] {
+    let mut z = seed.wrapping_add(1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     z = (z ^ z >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     z = (z ^ z >> 27).wrapping_mul(0x94D0_49BB_1331_11EB);
-    let bytes = (z ^ z >> 31).to_le_bytes();
+    (z ^ z >> 31).to_le_bytes()
+}
+
+/// Texels that no two channels and no two images share. Those of the normal map are vectors up to 45° off the axis, of length 1 to within
+/// 1e-5, so that it does not matter whether one reads z or finds it from x and y.
+pub fn texel_bytes(image: usize, x: usize, y: usize) -> [u8; 4] {
+    let place = ((image * IMAGE_SIZE + y) * IMAGE_SIZE + x) as u64;
     if image != NORMAL {
-        return [bytes[0], bytes[1], bytes[2], bytes[3]];
+        let [r, g, b, a, ..] = random_bytes(place);
+        return [r, g, b, a];
     }
-    let xy = DVec2::new(f64::from(bytes[0]) / 255.0 - 0.5, f64::from(bytes[1]) / 255.0 - 0.5);
-    let n = xy.extend((1.0 - xy.length_squared()).sqrt());
-    let byte = |v: f64| ((v + 1.0) * 127.5).round() as u8;
-    [byte(n.x), byte(n.y), byte(n.z), bytes[3]]
+    let texels = (0..).map(|attempt| {
+        let [r, g, a, ..] = random_bytes(place + (attempt << 32));
+        let xy = DVec2::new(f64::from(r / 2 + 64), f64::from(g / 2 + 64)) / 127.5 - 1.0;
+        let z = ((1.0 + (1.0 - xy.length_squared()).sqrt()) * 127.5).round();
+        [r / 2 + 64, g / 2 + 64, z as u8, a]
+    });
+    let vector = |t: [u8; 4]| DVec3::new(t[0].into(), t[1].into(), t[2].into()) / 127.5 - 1.0;
+    let mut unit = texels.filter(|texel| (vector(*texel).length() - 1.0).abs() < 1e-5);
+    unit.next().expect("an endless row of attempts")
 }
 
 /// The nearest texel at coordinates, channels in [0, 1] as the file has them; `None` near the edges of texels, where rounding decides.
@@ -75,10 +86,9 @@ pub fn texel(image: usize, uv: DVec2, wrap: [Wrap; 2]) -> Option<DVec4> {
         .then(|| DVec4::from_array(texel_bytes(image, x, y).map(|b| f64::from(b) / 255.0)))
 }
 
-/// The vector of a texel of the normal map. The file has its bytes nearest to a unit vector, whose x and y they are.
+/// The vector of a texel of the normal map.
 pub fn texel_vector(texel: DVec4) -> DVec3 {
-    let xy = texel.truncate().truncate() * 2.0 - 1.0;
-    xy.extend((1.0 - xy.length_squared()).sqrt())
+    texel.truncate() * 2.0 - 1.0
 }
 
 /// A texture with a sampler of nearest texels, as materials name it.
