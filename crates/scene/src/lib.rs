@@ -12,6 +12,7 @@ mod gltf;
 pub mod lights;
 mod load;
 mod model;
+mod mtl;
 mod obj;
 pub mod rng;
 mod tangent;

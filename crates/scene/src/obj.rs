@@ -1,6 +1,7 @@
-//! OBJ with MTL, parsed by `tobj`.
+//! OBJ, parsed by `tobj`, with materials of MTL.
 
 use std::{
+    cell::RefCell,
     io::{BufReader, Cursor},
     path::Path,
 };
@@ -9,26 +10,37 @@ use glam::{Affine3A, Vec2, Vec3, Vec4};
 
 use crate::{
     Aabb, AlphaMode, Image, ImageData, Instance, Material, Mesh, Node, Sampler, Scene, SceneError,
-    TextureRef, VertexAttributes, load::read_file, tangent, texture,
+    TextureRef, VertexAttributes,
+    load::read_file,
+    mtl::{self, MtlMaterial},
+    tangent, texture,
 };
 
 /// Loads an `.obj` from its bytes; `file` names it and gives the folder of materials and textures.
 pub(crate) fn load(file: &Path, bytes: &[u8]) -> Result<Scene, SceneError> {
+    load_with(file, bytes, &read_file)
+}
+
+/// The same with libraries read by `read_library`, which is given their paths.
+fn load_with(
+    file: &Path,
+    bytes: &[u8],
+    read_library: &dyn Fn(&Path) -> Result<Vec<u8>, SceneError>,
+) -> Result<Scene, SceneError> {
     let mut scene = Scene::default();
+    check_indices(file, bytes)?;
     let options =
         tobj::LoadOptions { single_index: true, triangulate: true, ignore_points: true, ignore_lines: true };
-    let parsed =
-        tobj::load_obj_buf(&mut BufReader::new(Cursor::new(bytes)), &options, |name| load_mtl(file, name));
-    let (models, materials) =
-        parsed.map_err(|e| SceneError::invalid(file, "OBJ", e.to_string(), "Wavefront OBJ"))?;
+    let libraries = RefCell::new(Libraries { file, read: read_library, materials: vec![], warnings: vec![] });
+    let parsed = tobj::load_obj_buf(&mut BufReader::new(Cursor::new(bytes)), &options, |name| {
+        libraries.borrow_mut().add(name)
+    });
+    let (models, _) = parsed.map_err(|e| SceneError::invalid(file, "OBJ", e.to_string(), "Wavefront OBJ"))?;
+    let libraries = libraries.into_inner();
+    scene.warnings = libraries.warnings;
     let mut images = Images { file, images: Vec::new() };
-    match materials {
-        Ok(materials) => {
-            for m in &materials {
-                scene.materials.push(convert_material(&mut images, m, &mut scene.warnings)?);
-            }
-        }
-        Err(e) => scene.warnings.push(format!("materials cannot be read ({e}); the default one is used")),
+    for m in &libraries.materials {
+        scene.materials.push(convert_material(&mut images, m, &mut scene.warnings)?);
     }
     scene.images = images.images;
     let mut default_material = None;
@@ -50,11 +62,64 @@ pub(crate) fn load(file: &Path, bytes: &[u8]) -> Result<Scene, SceneError> {
     Ok(scene)
 }
 
-/// Reads a material library beside the scene; a missing one is not an error of the scene.
-fn load_mtl(file: &Path, name: &Path) -> tobj::MTLLoadResult {
-    let path = file.parent().unwrap_or(Path::new("")).join(name);
-    let bytes = read_file(&path).map_err(|_| tobj::LoadError::OpenFileFailed)?;
-    tobj::load_mtl_buf(&mut BufReader::new(Cursor::new(bytes)))
+/// The material libraries that a file names.
+struct Libraries<'a> {
+    file: &'a Path,
+    read: &'a dyn Fn(&Path) -> Result<Vec<u8>, SceneError>,
+    /// Of all libraries, in order: `tobj` counts materials through them.
+    materials: Vec<MtlMaterial>,
+    warnings: Vec<String>,
+}
+
+impl Libraries<'_> {
+    /// Reads a library beside the scene; a missing one is not an error of the scene. To `tobj` materials are names.
+    fn add(&mut self, name: &Path) -> tobj::MTLLoadResult {
+        let path = self.file.parent().unwrap_or(Path::new("")).join(name);
+        let bytes = (self.read)(&path).map_err(|e| {
+            let reason = crate::error::one_line(&e.to_string());
+            self.warnings.push(format!("materials cannot be read ({reason}); the default one is used"));
+            tobj::LoadError::OpenFileFailed
+        })?;
+        let (materials, skipped) = mtl::parse(&path, &bytes);
+        self.warnings.extend(skipped);
+        let named = |m: &MtlMaterial| tobj::Material { name: m.name.clone(), ..tobj::Material::default() };
+        let names = materials.iter().map(named).collect();
+        let places = materials.iter().zip(0..).map(|(m, place)| (m.name.clone(), place)).collect();
+        self.materials.extend(materials);
+        Ok((names, places))
+    }
+}
+
+/// Refuses indices of faces that no file can have: `tobj` multiplies them without a look at how far they reach, and panics.
+///
+/// Others that point beyond their list are found by `tobj`. Lines that are no UTF-8 end its reading, and so do they here.
+fn check_indices(file: &Path, bytes: &[u8]) -> Result<(), SceneError> {
+    let text = std::str::from_utf8(bytes)
+        .unwrap_or_else(|e| std::str::from_utf8(&bytes[..e.valid_up_to()]).unwrap_or_default());
+    let mut counts = [0i64; 3];
+    for (number, line) in (1..).zip(text.lines()) {
+        let mut words = line.split_whitespace();
+        match words.next() {
+            Some("v") => counts[0] += 1,
+            Some("vt") => counts[1] += 1,
+            Some("vn") => counts[2] += 1,
+            Some("f" | "l") => {
+                for (index, count) in words.flat_map(|word| word.split('/').zip(counts)) {
+                    let Ok(value) = index.parse::<i64>() else { continue };
+                    if value < -count || value > i64::from(u32::MAX) {
+                        return Err(SceneError::invalid(
+                            file,
+                            format!("line {number}"),
+                            format!("the index {value}"),
+                            format!("{} to {}", -count, u32::MAX),
+                        ));
+                    }
+                }
+            }
+            _ => {}
+        }
+    }
+    Ok(())
 }
 
 struct Images<'a> {
@@ -113,21 +178,18 @@ fn texture_name(text: &str) -> Option<&str> {
 /// (Walter et al. 2007, their fit of Beckmann's α), perceptual roughness √α.
 fn convert_material(
     images: &mut Images,
-    m: &tobj::Material,
+    m: &MtlMaterial,
     warnings: &mut Vec<String>,
 ) -> Result<Material, SceneError> {
-    let extra = |keys: &[&str]| keys.iter().find_map(|k| m.unknown_param.get(*k));
-    let number =
-        |keys: &[&str]| extra(keys).and_then(|v| v.trim().parse::<f32>().ok()).filter(|v| v.is_finite());
-    let unit = |v: f32| if v.is_finite() { v.clamp(0.0, 1.0) } else { 0.0 };
+    let unit = |v: f32| v.clamp(0.0, 1.0);
     let mut map = |text: Option<&String>| text.map_or(Ok(None), |t| images.texture(t));
-    let alpha = m.dissolve.or(number(&["Tr"]).map(|t| 1.0 - t)).map_or(1.0, unit);
-    let base_color_texture = map(m.diffuse_texture.as_ref())?;
-    let opacity_texture = m.dissolve_texture.as_deref().and_then(texture_name);
+    let alpha = m.dissolve.or(m.transparency.map(|t| 1.0 - t)).map_or(1.0, unit);
+    let base_color_texture = map(m.diffuse_map.as_ref())?;
+    let opacity_texture = m.dissolve_map.as_deref().and_then(texture_name);
     let alpha_mode = match opacity_texture {
         // a coverage map: nearly always a cut-out, and glTF's alpha comes with the colour
         Some(name) => {
-            if m.diffuse_texture.as_deref().and_then(texture_name) != Some(name) {
+            if m.diffuse_map.as_deref().and_then(texture_name) != Some(name) {
                 warnings.push(format!(
                     "material {:?}: the opacity map is not joined with the colour map, whose own alpha is used",
                     crate::error::one_line(&m.name)
@@ -142,19 +204,15 @@ fn convert_material(
     // exporters write Kd 0 beside a colour map that they mean to be seen
     let kd = if base_color_texture.is_some() && kd == [0.0; 3] { [1.0; 3] } else { kd };
     let from_exponent = |ns: f32| (2.0 / (ns.max(0.0) + 2.0)).powf(0.25);
-    let roughness =
-        number(&["Pr"]).or(m.shininess.filter(|n| n.is_finite()).map(from_exponent)).map_or(1.0, unit);
-    let ke = m.emissive.unwrap_or([0.0; 3]).map(|v| if v.is_finite() { v.max(0.0) } else { 0.0 });
-    let emissive_texture = map(extra(&["map_Ke"]))?;
-    let normal = extra(&["norm", "map_Kn"]).or(m.normal_texture.as_ref());
-    let normal = normal.or(extra(&["map_Bump", "map_bump", "bump"]));
+    let ke = m.emissive.unwrap_or([0.0; 3]).map(|v| v.max(0.0));
+    let emissive_texture = map(m.emissive_map.as_ref())?;
     Ok(Material {
         name: m.name.clone(),
         base_color_factor: [kd[0], kd[1], kd[2], alpha],
         base_color_texture,
-        metallic_factor: number(&["Pm"]).map_or(0.0, unit),
-        roughness_factor: roughness,
-        normal_texture: map(normal)?,
+        metallic_factor: m.metalness.map_or(0.0, unit),
+        roughness_factor: m.roughness.or(m.exponent.map(from_exponent)).map_or(1.0, unit),
+        normal_texture: map(m.normal_map.as_ref().or(m.bump_map.as_ref()))?,
         emissive_factor: if emissive_texture.is_some() && ke == [0.0; 3] { [1.0; 3] } else { ke },
         emissive_texture,
         alpha_mode,
@@ -255,7 +313,209 @@ fn pick<T: Copy>(values: &[T], source: &[u32]) -> Vec<T> {
 
 #[cfg(test)]
 mod tests {
-    use super::texture_name;
+    use std::path::Path;
+
+    use proptest::prelude::*;
+
+    use super::{load_with, texture_name};
+    use crate::{Scene, SceneError};
+
+    /// A file and the one library that it names.
+    fn load_texts(obj: &[u8], mtl: &[u8]) -> Result<Scene, SceneError> {
+        load_with(Path::new("scenes/a.obj"), obj, &|_| Ok(mtl.to_vec()))
+    }
+
+    const TRIANGLE: &str = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\nusemtl m\nf 1 2 3\n";
+
+    #[test]
+    fn a_library_with_rare_statements_keeps_its_materials() {
+        let mtl = b"newmtl m\nKd 1\nKe spectral a.rfl\nd -halo 0.5\n";
+        let scene = load_texts(TRIANGLE.as_bytes(), mtl).unwrap_or_else(|e| panic!("{e}"));
+        assert_eq!(
+            scene.materials[scene.meshes[0].material as usize].base_color_factor,
+            [1.0, 1.0, 1.0, 0.5]
+        );
+        assert_eq!(scene.warnings.len(), 1, "{:?}", scene.warnings);
+        assert!(scene.warnings[0].contains("a.mtl: line 3") && scene.warnings[0].contains("spectral"));
+    }
+
+    #[test]
+    fn indices_that_no_file_can_have_are_named() {
+        for face in [
+            "f 1/-2 2 3",
+            "f 1//-2 2 3",
+            "f -4 2 3",
+            "f 1/9223372036854775807 2 3",
+            "f 1//-9223372036854775808 2 3",
+            "f 1//6148914691236517206 2 3",
+            "l 1/4294967296 2",
+        ] {
+            let text = TRIANGLE.replace("f 1 2 3", face);
+            let error = load_texts(text.as_bytes(), b"").expect_err(face).to_string();
+            assert!(
+                error.starts_with("scenes/a.obj: line 8: found the index ") && error.contains("expected"),
+                "{error}"
+            );
+        }
+    }
+
+    /// Words of both formats, right ones and wrong ones.
+    const WORDS: &[&str] = &[
+        "v",
+        "vt",
+        "vn",
+        "vp",
+        "f",
+        "l",
+        "p",
+        "o",
+        "g",
+        "s",
+        "usemtl",
+        "mtllib",
+        "newmtl",
+        "Ka",
+        "Kd",
+        "Ks",
+        "Ke",
+        "Tf",
+        "Ns",
+        "Ni",
+        "d",
+        "Tr",
+        "Pm",
+        "Pr",
+        "illum",
+        "sharpness",
+        "map_d",
+        "decal",
+        "disp",
+        "refl",
+        "-halo",
+        "spectral",
+        "xyz",
+        "m",
+        "a.mtl",
+        "b.mtl c.mtl",
+        "\\",
+        "\t",
+        "#",
+        "",
+        "0",
+        "1",
+        "2",
+        "3",
+        "-1",
+        "-2",
+        "-3",
+        "-9",
+        "0.5",
+        "nan",
+        "inf",
+        "-inf",
+        "1e39",
+        "1e-45",
+        "1/1/1",
+        "2//1",
+        "3/1",
+        "1/",
+        "/1",
+        "//",
+        "-1/-1/-1",
+        "1/-2/1",
+        "1/1/1/1",
+        "4294967295",
+        "4294967296",
+        "9223372036854775807",
+        "-9223372036854775808",
+        "6148914691236517206",
+        "caf\u{e9}",
+    ];
+
+    /// Lines of both formats that say something.
+    const LINES: &[&str] = &[
+        "v 0 0 1",
+        "v 1 1 0 0.5",
+        "v 0 1 1 1 0 0",
+        "vt 0.5 0.5",
+        "vt 0.5 0.5 0.5",
+        "vn 0 1 0",
+        "o a",
+        "g a b",
+        "s off",
+        "usemtl m",
+        "usemtl n",
+        "f 1 2 3",
+        "f 1/1 2/1 3/1 1/1",
+        "f -1 -2 -3",
+        "f 1//1 2//1 3//1",
+        "f 1/1/1 2 3",
+        "l 1 2",
+        "p 1",
+        "f 1 1 1",
+        "mtllib b.mtl",
+        "newmtl m",
+        "newmtl n",
+        "Kd 0.5",
+        "Kd 1 0 0",
+        "Ke 2",
+        "d 0.5",
+        "d -halo 0.1",
+        "Tr 1",
+        "Ns 10",
+        "Ns -1",
+        "Pm 0.5",
+        "Pr 2",
+        "illum 2",
+        "Kd xyz 1 1 1",
+        "Kd 1e38 1e38 1e38",
+        "map_Kd",
+        "norm",
+    ];
+
+    fn line() -> impl Strategy<Value = String> {
+        let words =
+            prop::collection::vec(prop::sample::select(WORDS), 0..7).prop_map(|words| words.join(" "));
+        prop_oneof![3 => prop::sample::select(LINES).prop_map(str::to_owned), 1 => words]
+    }
+
+    /// Lines right and wrong, bytes of any kind between them.
+    fn text(start: &'static str) -> impl Strategy<Value = Vec<u8>> {
+        let damage = prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..3);
+        (prop::collection::vec(line(), 0..10), damage).prop_map(move |(lines, damage)| {
+            let mut bytes = format!("{start}{}\n", lines.join("\n")).into_bytes();
+            for (at, byte) in damage {
+                let at = at.index(bytes.len());
+                bytes[at] = byte;
+            }
+            bytes
+        })
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(4000))]
+
+        #[test]
+        fn any_lines_of_a_library_end_in_a_scene_or_an_error(mtl in text("newmtl m\n")) {
+            match load_texts(TRIANGLE.as_bytes(), &mtl) {
+                Ok(scene) => {
+                    let m = &scene.materials[scene.meshes[0].material as usize];
+                    let factors = m.base_color_factor.iter().chain(&m.emissive_factor);
+                    prop_assert!(factors.chain([&m.metallic_factor, &m.roughness_factor]).all(|v| v.is_finite()));
+                    prop_assert!(scene.warnings.iter().all(|w| !w.contains('\n')), "{:?}", scene.warnings);
+                }
+                Err(e) => prop_assert!(!e.to_string().contains('\n'), "{e}"),
+            }
+        }
+
+        #[test]
+        fn any_lines_of_a_file_end_in_a_scene_or_an_error(obj in text(&TRIANGLE[..TRIANGLE.len() - 8])) {
+            match load_texts(&obj, b"newmtl m\nKd 1\nmap_Kd\n") {
+                Ok(scene) => prop_assert!(scene.positions_os.iter().flatten().all(|v| v.is_finite())),
+                Err(e) => prop_assert!(!e.to_string().contains('\n'), "{e}"),
+            }
+        }
+    }
 
     #[test]
     fn options_before_a_texture_are_skipped() {

@@ -3,12 +3,13 @@
 
 mod load_common;
 
-use std::path::Path;
+use std::{io::Cursor, path::Path};
 
 use afterlight_scene::{
-    LoadOptions, load_bytes,
+    Image, ImageData, LoadOptions, load_bytes,
     texture::{TextureRole, decode},
 };
+use image::{DynamicImage, ImageFormat, ImageReader};
 use load_common::{check_scene, files_under, scenes_dir};
 use rayon::prelude::*;
 
@@ -129,6 +130,7 @@ fn damaged_files_end_in_a_scene_or_an_error() {
 
 #[test]
 fn damaged_obj_files_end_in_a_scene_or_an_error() {
+    // Materials and indices of every kind: tests in `src/obj.rs`, which need no files.
     let original = "mtllib a.mtl\no one\nv 0 0 0\nv 1 0 0 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\nusemtl m\nf 1/1/1 2/1/1 3/1/1 4/1/1\nf 1 2 3\nl 1 2\n";
     (0..20_000u64).into_par_iter().for_each(|seed| {
         let mut random = Random(seed);
@@ -138,6 +140,76 @@ fn damaged_obj_files_end_in_a_scene_or_an_error() {
         }
         try_load(Path::new("damaged.obj"), &bytes);
     });
+}
+
+/// Small images in every format, and every kind of pixels, that a scene may bring.
+fn encoded_images() -> Vec<(String, Vec<u8>)> {
+    let (width, height) = (11, 7);
+    let colors = DynamicImage::ImageRgba8(image::RgbaImage::from_fn(width, height, |x, y| {
+        image::Rgba([x * 23, y * 31, x * y, 255 - x].map(|v| v as u8))
+    }));
+    let (luma8, luma16) = (colors.to_luma8(), colors.to_luma16());
+    let pngs: [DynamicImage; 8] = [
+        luma8.clone().into(),
+        colors.to_luma_alpha8().into(),
+        colors.to_rgb8().into(),
+        colors.to_rgba8().into(),
+        luma16.into(),
+        colors.to_luma_alpha16().into(),
+        colors.to_rgb16().into(),
+        colors.to_rgba16().into(),
+    ];
+    let jpegs: [DynamicImage; 2] = [luma8.into(), colors.to_rgb8().into()];
+    let pngs = pngs.map(|image| (ImageFormat::Png, image));
+    let images = pngs.into_iter().chain(jpegs.map(|image| (ImageFormat::Jpeg, image)));
+    images
+        .map(|(format, image)| {
+            let mut bytes = Cursor::new(Vec::new());
+            image.write_to(&mut bytes, format).unwrap();
+            (format!("{format:?} {:?}", image.color()), bytes.into_inner())
+        })
+        .collect()
+}
+
+#[test]
+fn damaged_images_end_in_texels_or_an_error() {
+    /// Larger ones are refused or take memory and time, and show no more.
+    const PIXELS_MAX: u64 = 1 << 20;
+    const TRIES: u64 = 2000;
+    let roles = [TextureRole::BaseColor, TextureRole::Emissive, TextureRole::Normal, TextureRole::Data];
+    for (name, original) in encoded_images() {
+        let (refused, accepted) = (0..TRIES)
+            .into_par_iter()
+            .map(|seed| {
+                let mut random = Random(seed);
+                let mut bytes = original.clone();
+                for _ in 0..random.below(4) {
+                    mutate(&mut bytes, &mut random);
+                }
+                let size =
+                    ImageReader::new(Cursor::new(&bytes)).with_guessed_format().unwrap().into_dimensions();
+                if size.is_ok_and(|(width, height)| u64::from(width) * u64::from(height) > PIXELS_MAX) {
+                    return (0, 0);
+                }
+                let data = ImageData::Encoded(bytes.into());
+                let image = Image { name: name.clone(), data, width: 11, height: 7 };
+                match decode(&image, roles[random.below(4)], Some((5, 3))) {
+                    Ok(chain) => {
+                        assert_eq!((chain.width, chain.height, chain.levels.len()), (5, 3, 3), "{name}");
+                        (0, 1)
+                    }
+                    Err(e) => {
+                        let error = e.to_string();
+                        assert!(error.starts_with(&name) && error.contains("expected"), "{error}");
+                        assert!(!error.contains('\n'), "{error:?}");
+                        (1, 0)
+                    }
+                }
+            })
+            .reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
+        println!("{name}: {refused} refused, {accepted} accepted");
+        assert!(refused > 100 && accepted > 100, "{name}: {refused} refused, {accepted} accepted");
+    }
 }
 
 #[test]

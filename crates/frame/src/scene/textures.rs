@@ -3,15 +3,20 @@
 //! A scene with more sizes than a shader has buckets gets its textures resampled up to powers of two, then merged into
 //! larger ones, until they fit; a warning says so.
 
-use std::collections::BTreeMap;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::{
+    collections::BTreeMap,
+    num::NonZero,
+    sync::{
+        atomic::{AtomicUsize, Ordering},
+        mpsc::{Receiver, SyncSender, sync_channel},
+    },
+};
 
 use afterlight_graph::gpu::{self, vk};
 use afterlight_scene::{
     Image, MipMode, Sampler, Scene, SceneError, TextureRef, Wrap,
     texture::{MipChain, TexelFormat, TextureRole, decode},
 };
-use rayon::prelude::*;
 
 use crate::{
     TechniqueError,
@@ -147,7 +152,7 @@ impl TextureTable {
     /// Decodes all textures in parallel and uploads them.
     ///
     /// # Errors
-    /// An image that does not decode; the device.
+    /// An image that does not decode, of several the first in the scene's order; the device.
     pub fn upload(
         &self,
         device: &gpu::Device,
@@ -161,43 +166,25 @@ impl TextureTable {
             let mut class_arrays = Vec::new();
             for (bucket, (key, layers)) in buckets.iter().enumerate() {
                 class_arrays.push(create_array(device, class, key, layers.len() as u32)?);
-                jobs.extend(
-                    layers
-                        .iter()
-                        .enumerate()
-                        .map(|(layer, place)| (class, bucket, layer as u32, *place, *key)),
-                );
+                jobs.extend((0..).zip(layers).map(|(layer, place)| {
+                    let target = Target { class, bucket, layer, place: *place };
+                    Job { target, size_px: (key.width, key.height) }
+                }));
             }
             arrays.push(class_arrays);
         }
         // Largest first, so that no long decode is left for the end.
-        jobs.sort_by_key(|(.., key)| std::cmp::Reverse(u64::from(key.width) * u64::from(key.height)));
-        let total = jobs.len();
-        let done = AtomicUsize::new(0);
-        let (send, receive) = std::sync::mpsc::sync_channel(DECODED_IN_FLIGHT);
+        jobs.sort_by_key(|job| std::cmp::Reverse(u64::from(job.size_px.0) * u64::from(job.size_px.1)));
+        let (send, receive) = sync_channel(DECODED_IN_FLIGHT);
+        let (decoders, total, next) = (decoder_count(jobs.len()), jobs.len(), AtomicUsize::new(0));
         std::thread::scope(|scope| {
-            scope.spawn(move || {
-                // A receiver that is gone has met an error already.
-                jobs.into_par_iter().for_each_with(send, |send, (class, bucket, layer, place, key)| {
-                    let decoded = decode(
-                        &images[place.image as usize],
-                        role_of(place.role),
-                        Some((key.width, key.height)),
-                    );
-                    let _ = send.send((class, bucket, layer, decoded));
-                });
-            });
-            receive.iter().try_for_each(
-                |(class, bucket, layer, decoded): (usize, usize, u32, Result<MipChain, SceneError>)| {
-                    let chain = decoded?;
-                    check_format(class, &chain);
-                    for (mip, level) in chain.levels.iter().enumerate() {
-                        uploader.image(&arrays[class][bucket], mip as u32, layer, level)?;
-                    }
-                    progress(done.fetch_add(1, Ordering::Relaxed) + 1, total);
-                    Ok::<(), TechniqueError>(())
-                },
-            )
+            for _ in 0..decoders {
+                let (jobs, next, send) = (&jobs, &next, send.clone());
+                scope.spawn(move || decode_next(jobs, next, images, &send));
+            }
+            drop(send);
+            // The receiver ends with this call, whichever way it returns: decoders that wait for room in the channel then end too.
+            upload_decoded(receive, uploader, &arrays, |done| progress(done, total))
         })?;
         self.describe(device, uploader, &arrays)
     }
@@ -240,6 +227,70 @@ impl TextureTable {
         let bytes = arrays.iter().flatten().map(gpu::Image::allocated_bytes).sum();
         Ok(UploadedTextures { set: device.create_texture_set("scene textures", &layout, &writes)?, bytes })
     }
+}
+
+/// The layer of an array that a texture goes to.
+#[derive(Clone, Copy)]
+struct Target {
+    class: usize,
+    bucket: usize,
+    layer: u32,
+    place: Use,
+}
+
+/// A texture to be decoded at a size.
+struct Job {
+    target: Target,
+    size_px: (u32, u32),
+}
+
+/// A decoded texture, or why there is none.
+type Decoded = (Target, Result<MipChain, SceneError>);
+
+/// Threads that decode: one a core. They are no pool's: of a pool, the thread that receives may be the only one.
+fn decoder_count(jobs: usize) -> usize {
+    std::thread::available_parallelism().map_or(1, NonZero::get).min(jobs)
+}
+
+/// Decodes the jobs that no other thread has begun, in their order, as long as someone receives what comes out: a receiver that is
+/// gone has met an error of the device.
+fn decode_next(jobs: &[Job], next: &AtomicUsize, images: &[Image], send: &SyncSender<Decoded>) {
+    while let Some(Job { target, size_px }) = jobs.get(next.fetch_add(1, Ordering::Relaxed)) {
+        let image = &images[target.place.image as usize];
+        let decoded = decode(image, role_of(target.place.role), Some(*size_px));
+        if send.send((*target, decoded)).is_err() {
+            return;
+        }
+    }
+}
+
+/// Uploads textures as they are decoded. After one that did not decode the others are received and dropped, so that the error does
+/// not depend on which came first; an error of the device ends the call at once, and the receiver with it.
+fn upload_decoded(
+    receive: Receiver<Decoded>,
+    uploader: &mut gpu::Uploader,
+    arrays: &[Vec<gpu::Image>],
+    progress: impl Fn(usize),
+) -> Result<(), TechniqueError> {
+    let mut undecoded: Option<(Use, SceneError)> = None;
+    for (done, (Target { class, bucket, layer, place }, decoded)) in (1..).zip(receive) {
+        match decoded {
+            Ok(chain) if undecoded.is_none() => {
+                check_format(class, &chain);
+                for (mip, level) in (0..).zip(&chain.levels) {
+                    uploader.image(&arrays[class][bucket], mip, layer, level)?;
+                }
+                progress(done);
+            }
+            Ok(_) => {}
+            Err(error) => {
+                if undecoded.as_ref().is_none_or(|(first, _)| place < *first) {
+                    undecoded = Some((place, error));
+                }
+            }
+        }
+    }
+    undecoded.map_or(Ok(()), |(_, error)| Err(error.into()))
 }
 
 fn check_format(class: usize, chain: &MipChain) {

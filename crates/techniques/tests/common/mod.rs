@@ -1,6 +1,8 @@
 //! What the tests of whole techniques share: a scene on the validated device, images, comparisons.
 #![allow(dead_code)] // each test file uses a part
 
+pub mod quads;
+
 use std::{
     path::{Path, PathBuf},
     sync::Arc,
@@ -194,13 +196,24 @@ pub fn compiled(name: &str, path: &Path, defines: &[&str], replaced: &[(&str, &s
 
 /// Compiles a shader with parts of a header's text replaced: `header` is the name by which shaders include it.
 pub fn compiled_with_header(name: &str, header: &str, replaced: &[(&str, &str)]) -> Shader {
+    compiled_variant_with_header(name, &[], header, replaced)
+}
+
+/// The same for a variant with defines; `name` is that of its shader, `#` and its own.
+pub fn compiled_variant_with_header(
+    name: &str,
+    defines: &[&str],
+    header: &str,
+    replaced: &[(&str, &str)],
+) -> Shader {
     in_temporary_folder(|changed| {
         let written = changed.join(header);
         std::fs::create_dir_all(written.parent().expect("a folder")).expect("a temporary folder");
         let text = replaced_text(&source(header), replaced);
         std::fs::write(&written, text).expect("a file in the temporary folder");
-        let path = source(&format!("{name}.glsl"));
-        compile(name, &path, path.parent().expect("a folder"), &[], changed)
+        let shader = name.split_once('#').map_or(name, |(shader, _)| shader);
+        let path = source(&format!("{shader}.glsl"));
+        compile(name, &path, path.parent().expect("a folder"), defines, changed)
     })
 }
 
