@@ -2,7 +2,7 @@
 
 use afterlight_image::Rgba8Image;
 use afterlight_measure::{Run, RunResult, SCHEMA, Status};
-use afterlight_techniques::{Exactness, Info, Post, view};
+use afterlight_techniques::{Exactness, Post, exactness_of, view};
 
 use crate::{Chosen, FrameSpec, LabError, Listener, Session, differences, measure};
 
@@ -71,7 +71,7 @@ pub fn compare(
         let differences = differences(truth, &drawn)?;
         for ((result, chosen), difference) in results.iter_mut().zip(chosen).zip(differences) {
             let Some(difference) = difference else { continue };
-            judge(result, chosen.technique.info(), difference.psnr_or_infinity_db(), spec, &reference);
+            judge(result, chosen, difference.psnr_or_infinity_db(), spec, &reference);
             result.difference = Some(difference);
         }
     } else {
@@ -99,14 +99,14 @@ pub fn most_fragments(result: &RunResult) -> Option<u64> {
 }
 
 /// Marks a technique as failed whose image is further from the reference than it may be.
-fn judge(result: &mut RunResult, info: &Info, psnr_db: f64, spec: &FrameSpec, reference: &Chosen) {
+fn judge(result: &mut RunResult, chosen: &Chosen, psnr_db: f64, spec: &FrameSpec, reference: &Chosen) {
     // Bounds are stated against forward's image.
     if reference.id() != "forward" || spec.view != view::FINAL {
         return;
     }
     // A filter decides by the image: a difference of rounding may become another decision.
     let is_plain = spec.samples == 1 && spec.effects.post.filter == Post::None;
-    let least_db = match info.exactness {
+    let least_db = match exactness_of(chosen.technique, &chosen.params, spec.samples) {
         Exactness::Exact { min_psnr_db } if is_plain => min_psnr_db,
         Exactness::Exact { .. } => MULTISAMPLE_PSNR_DB,
         Exactness::Approximate { min_psnr_db, .. } => min_psnr_db,

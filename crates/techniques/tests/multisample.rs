@@ -4,9 +4,9 @@ mod common;
 
 use afterlight_stages::lights::step::asked;
 use afterlight_techniques::{
-    Params, Settings, Technique, Transparency, find, graph::gpu, registry, scene::Camera,
+    Params, Settings, Shadows, Technique, Transparency, find, graph::gpu, registry, scene::Camera,
 };
-use common::{Stage, image_of, params, psnr};
+use common::{Stage, image_of, least_db, params, psnr};
 use glam::Vec3;
 
 /// Least PSNR to `forward` at as many samples, dB (contract).
@@ -29,6 +29,9 @@ fn ways(id: &str) -> &'static [&'static [(&'static str, &'static str)]] {
             &[("fill", "cache"), ("reference-bits", "8")],
         ],
         "dais-list" => &[&[], &[("bands", "1")], &[("bands", "3")]],
+        "deferred-ssaa" => &[&[], &[("position", "sample")]],
+        "deferred-msaa" => &[&[], &[("position", "sample")], &[("edges", "centroid")]],
+        "light-prepass" => &[&[], &[("edge-light", "pixel")]],
         _ => &[&[]],
     }
 }
@@ -60,9 +63,10 @@ fn all_agree(stage: &Stage, settings: &Settings, what: &str, runs: usize) {
             for run in 0..runs {
                 let db = psnr(&reference, &image_of(&mut prepared));
                 println!("{what}, {samples} samples: {name} run {run}: {db:.2} dB");
+                let least_db = least_db(technique, &params, samples);
                 assert!(
-                    db >= MIN_PSNR_DB,
-                    "{what}, {samples} samples: {name} run {run}: {db:.2} dB to forward"
+                    db >= least_db,
+                    "{what}, {samples} samples: {name} run {run}: {db:.2} dB to forward, {least_db} promised"
                 );
             }
         }
@@ -91,6 +95,39 @@ fn on_sponza() {
     let camera =
         Camera::look_at("view", Vec3::new(-9.0, 2.5, 0.0), Vec3::new(5.0, 3.0, 0.0), 60f32.to_radians(), 0.1);
     all_agree(&stage, &stage.from(camera, (320, 180), 100), "sponza", 1);
+}
+
+/// Views whose light changes within pixels: few of them, scenes small in them, floors under a low eye, sharp shadows. `deferred-ssaa` and
+/// `deferred-msaa` were 34.7 and 35.8 dB off in the first two, when they lit surfaces at their samples.
+fn views_of_few_pixels(gpu: &gpu::Device) -> Vec<(Stage, Settings, &'static str)> {
+    let mut views = Vec::new();
+    let stage = Stage::new(gpu, "builtin:spheres");
+    let settings = stage.settings((96, 54), 10);
+    views.push((stage, settings, "spheres of 96x54"));
+    let stage = Stage::new(gpu, "builtin:colonnade?triangles=30000");
+    let settings = stage.settings((160, 90), 5).with_effects(|effects| {
+        effects.shadows.method = Shadows::Map;
+        effects.shadows.map_size_px = 4096;
+    });
+    views.push((stage, settings, "sharp shadows"));
+    for (what, seed) in [("a low eye", 1u32), ("another low eye", 2), ("a third", 3)] {
+        let stage = Stage::new(gpu, "builtin:colonnade?triangles=17000&texture=64");
+        let bounds = stage.scene.bounds_ws();
+        let eye = bounds.min + bounds.size() * Vec3::new(0.2 * seed as f32, 0.01 * seed as f32, 0.3);
+        let camera =
+            Camera::look_at(what, eye, eye + Vec3::new(1.0, -0.02, 0.3 - 0.2 * seed as f32), 1.2, 0.02);
+        let settings = stage.from(camera, (97, 55), 200);
+        views.push((stage, settings, what));
+    }
+    views
+}
+
+#[test]
+fn where_light_changes_within_pixels() {
+    let gpu = afterlight_testkit::gpu();
+    for (stage, settings, what) in views_of_few_pixels(&gpu) {
+        all_agree(&stage, &settings, what, 1);
+    }
 }
 
 /// One sample is not several: a comparison that cannot tell would prove nothing.
