@@ -354,6 +354,41 @@ fn filters_store_fewer_samples() {
     }
 }
 
+/// The paper's detector has a known answer before a plane that faces the eye: depth is the near distance over the view distance, and that of
+/// the background 0. A threshold below the difference finds its edge, one above does not; by distances the background is always an edge.
+#[test]
+fn depth_edges_by_range_are_the_papers() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:edge");
+    let (near_m, distance_m) = (0.1, 2.0);
+    let camera = Camera::look_at("front", Vec3::Z * distance_m, Vec3::ZERO, 0.8, near_m);
+    let depth = near_m / distance_m;
+    for samples in counts(&gpu) {
+        let settings = Settings { samples, ..stage.from(camera.clone(), (96, 54), 0) };
+        for fill in ["compute", "raster"] {
+            let greys = |measure: &str, threshold: f32| {
+                let threshold = threshold.to_string();
+                let sets = [
+                    ("fill", fill),
+                    ("filter", "depth-edges"),
+                    ("depth-edges", measure),
+                    ("edge-threshold", &threshold),
+                ];
+                let image = list_image(&stage, &settings, &sets);
+                let white = image.pixels.chunks_exact(4).map(|p| p[0]).max().unwrap_or(0);
+                image.pixels.chunks_exact(4).filter(|p| p[0] > 0 && p[0] < white).count()
+            };
+            let below = greys("range", 0.95 * depth);
+            assert!(
+                below > 20,
+                "{samples} samples, {fill}: {below} grey pixels at a threshold below the range"
+            );
+            assert_eq!(greys("range", 1.05 * depth), 0, "{samples} samples, {fill}: above the range");
+            assert_eq!(greys("relative", 1.05 * depth), below, "{samples} samples, {fill}: by distances");
+        }
+    }
+}
+
 /// Rasterisation in compute finds what the raster pass finds: triangles before the near plane, of every size, and more of
 /// them than the first frame has room for.
 #[test]

@@ -106,3 +106,35 @@ fn random_views_agree_with_forward() {
     println!("lit at samples: {worst_at_samples:.2} dB at worst");
     assert!(worst_at_samples < 38.0, "light at samples stays within the bound of light at centres");
 }
+
+/// Where a device's centroids tell no edge, as Vulkan lets them, fragments that differ within a pixel do: silhouettes, edges between
+/// triangles and intersections.
+#[test]
+fn edges_are_found_without_centroids() {
+    let gpu = afterlight_testkit::gpu();
+    let technique = find("deferred-msaa").unwrap();
+    for scene in ["builtin:spheres", "builtin:intersect"] {
+        let stage = Stage::new(&gpu, scene);
+        for lights in ["all", "clusters"] {
+            let settings = Settings { samples: 4, ..stage.settings((161, 91), 20) };
+            let reference = stage.image(find("forward").unwrap(), &settings);
+            let db = |edges: &str| {
+                let params = params(technique, &[("lights", lights), ("edges", edges)]);
+                let unmarked = compiled(
+                    "surfaces/samples/samples.frag",
+                    &source("surfaces/samples/samples.frag.glsl"),
+                    &[],
+                    &[("edge ? word | SAMPLE_EDGE : word", "word")],
+                );
+                let mut prepared = stage.prepare_shaders(technique, &settings, &params, [unmarked]);
+                psnr(&reference, &image_of(&mut prepared))
+            };
+            let (fragments, centroid) = (db("fragments"), db("centroid"));
+            println!(
+                "{scene}, lights={lights}: {fragments:.2} dB by fragments, {centroid:.2} by centroids that tell none"
+            );
+            assert!(fragments >= 45.0, "{scene}, lights={lights}: {fragments:.2} dB to forward");
+            assert!(centroid < 38.0, "{scene}, lights={lights}: {centroid:.2} dB without edges");
+        }
+    }
+}
