@@ -67,7 +67,6 @@ static INFO: Info = Info {
     samples: ANY_SAMPLES,
     tessellation: false,
     views: shade::VIEWS,
-    ..Info::USUAL
 };
 
 /// Most blocks that a narrow pointer tells apart: 26 bits of index.
