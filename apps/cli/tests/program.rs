@@ -157,7 +157,17 @@ fn lists_are_text_and_json() {
     let list = techniques["techniques"].as_array().expect("a list");
     assert!(list.iter().any(|one| one["id"] == "forward"));
     for one in list {
-        for key in ["title", "sources", "answers", "appendix_a", "exactness", "params", "views"] {
+        for key in [
+            "title",
+            "sources",
+            "answers",
+            "appendix_a",
+            "exactness",
+            "approximations",
+            "departures",
+            "params",
+            "views",
+        ] {
             assert!(!one[key].is_null(), "{}: {key}", one["id"]);
         }
     }

@@ -41,7 +41,7 @@ pub use scene::{
 pub use settings::Settings;
 pub use slots::{Slots, SourceSlots, set_constants};
 pub use technique::{
-    ANY_SAMPLES, Answers, AppendixA, Exactness, Info, MULTIPLE_SAMPLES, Need, Source, Technique, completed,
-    params_of, set_param,
+    ANY_SAMPLES, Answers, AppendixA, Approximation, Condition, Exactness, Info, MULTIPLE_SAMPLES, Need,
+    Source, Technique, completed, exactness_of, params_of, set_param,
 };
 pub use views::LightPairs;

@@ -66,6 +66,53 @@ pub enum Exactness {
     },
 }
 
+/// What a way of a technique needs to be that way.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Condition {
+    /// A parameter, by its key, has this value.
+    Param(&'static str, &'static str),
+    /// Several samples a pixel.
+    SeveralSamples,
+}
+
+impl Condition {
+    /// Whether it holds of all parameters of a technique at so many samples a pixel.
+    pub fn holds(self, params: &Params, samples: u32) -> bool {
+        match self {
+            Self::Param(key, value) => params.get(key).as_deref() == Some(value),
+            Self::SeveralSamples => samples > 1,
+        }
+    }
+}
+
+impl std::fmt::Display for Condition {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Param(key, value) => write!(f, "{key}={value}"),
+            Self::SeveralSamples => write!(f, "several samples"),
+        }
+    }
+}
+
+/// A way of a technique, often its paper's, that is further from `forward` than [`Info::exactness`] says.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Approximation {
+    /// The way: all of these hold.
+    pub when: &'static [Condition],
+    /// The bound in words.
+    pub bound: &'static str,
+    /// Least PSNR to `forward` at as many samples, dB.
+    pub min_psnr_db: f64,
+}
+
+impl Approximation {
+    /// The way in words: `edges=pixel, several samples`.
+    pub fn when_text(&self) -> String {
+        self.when.iter().map(Condition::to_string).collect::<Vec<_>>().join(", ")
+    }
+}
+
 /// A feature that a technique needs of the device.
 #[derive(Clone, Copy)]
 pub struct Need {
@@ -89,8 +136,12 @@ pub struct Info {
     pub answers: Answers,
     /// Its row of Appendix A.
     pub appendix_a: AppendixA,
-    /// Exact or approximate.
+    /// Exact or approximate, by default.
     pub exactness: Exactness,
+    /// Ways of it that are further from `forward` than that; the first whose conditions hold counts.
+    pub approximations: &'static [Approximation],
+    /// What differs from its sources and why, a sentence each.
+    pub departures: &'static [&'static str],
     /// What it needs beyond what the program needs.
     pub needs: &'static [Need],
     /// Sample counts that it can render where the device has them.
@@ -103,7 +154,8 @@ pub struct Info {
 
 impl Info {
     /// What most techniques have in common, for `..Info::USUAL` after what is a technique's own: one sample a pixel, tessellated surfaces,
-    /// no needs, no views.
+    /// no needs, no views, no
+    /// ways that are further from `forward`, no departures.
     pub const USUAL: Info = Info {
         id: "",
         title: "",
@@ -120,6 +172,8 @@ impl Info {
             rates_decoupled: "",
         },
         exactness: Exactness::Exact { min_psnr_db: 50.0 },
+        approximations: &[],
+        departures: &[],
         needs: &[],
         samples: &[1],
         tessellation: true,
@@ -151,12 +205,6 @@ pub trait Technique: Send + Sync {
     /// [`params_of`], whatever their values.
     fn predict(&self, workload: &Workload, params: &Params) -> Cost;
 
-    /// Whether it computes the reference's image with its parameters, all of [`params_of`]: `info().exactness` is that of their defaults.
-    fn exactness(&self, params: &Params) -> Exactness {
-        let _ = params;
-        self.info().exactness
-    }
-
     /// Declares its passes, named `id/stage`, and returns the image of linear radiance, RGBA16F, that they end in.
     ///
     /// # Errors
@@ -183,6 +231,19 @@ pub fn params_of(technique: &dyn Technique) -> Params {
 /// All parameters of a technique, with the values that `params` has for them; what is not there has its default.
 pub fn completed(technique: &dyn Technique, params: &Params) -> Params {
     params.over(params_of(technique))
+}
+
+/// How near to `forward` a technique's image is with these parameters at so many samples a pixel: [`Info::exactness`], or the first of
+/// [`Info::approximations`] whose conditions hold.
+pub fn exactness_of(technique: &dyn Technique, params: &Params, samples: u32) -> Exactness {
+    let info = technique.info();
+    let params = completed(technique, params);
+    let mut ways = info.approximations.iter();
+    let way = ways.find(|way| way.when.iter().all(|condition| condition.holds(&params, samples)));
+    way.map_or(info.exactness, |way| Exactness::Approximate {
+        bound: way.bound,
+        min_psnr_db: way.min_psnr_db,
+    })
 }
 
 /// Sets a parameter of a technique from text, among [`params_of`] it.

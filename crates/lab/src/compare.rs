@@ -2,7 +2,7 @@
 
 use afterlight_image::Rgba8Image;
 use afterlight_measure::{Run, RunResult, SCHEMA, Status};
-use afterlight_techniques::{Exactness, Post, view};
+use afterlight_techniques::{Exactness, Post, exactness_of, view};
 
 use crate::{Chosen, FrameSpec, LabError, Listener, Session, differences, measure};
 
@@ -106,7 +106,7 @@ fn judge(result: &mut RunResult, chosen: &Chosen, psnr_db: f64, spec: &FrameSpec
     }
     // A filter decides by the image: a difference of rounding may become another decision.
     let is_plain = spec.samples == 1 && spec.effects.post.filter == Post::None;
-    let least_db = match chosen.technique.exactness(&chosen.params) {
+    let least_db = match exactness_of(chosen.technique, &chosen.params, spec.samples) {
         Exactness::Exact { min_psnr_db } if is_plain => min_psnr_db,
         Exactness::Exact { .. } => MULTISAMPLE_PSNR_DB,
         Exactness::Approximate { min_psnr_db, .. } => min_psnr_db,

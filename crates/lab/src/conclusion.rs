@@ -1,7 +1,7 @@
 //! What a comparison comes to.
 
 use afterlight_measure::{Run, RunResult, Status};
-use afterlight_techniques::{Exactness, find, params_of, set_param};
+use afterlight_techniques::{Exactness, exactness_of, find, params_of, set_param};
 
 /// How many times the fastest technique's frame time one with less memory may take.
 pub const TIME_FACTOR: f64 = 1.5;
@@ -35,7 +35,7 @@ impl<'a> Conclusion<'a> {
         ordered.sort_by(|a, b| frame_ms(a).total_cmp(&frame_ms(b)));
         let is_exact = |result: &&&RunResult| {
             let has_figures = result.status == Status::Ok && result.frame_ms.is_some();
-            has_figures && matches!(exactness(result), Some(Exactness::Exact { .. }))
+            has_figures && matches!(exactness(result, run.settings.samples), Some(Exactness::Exact { .. }))
         };
         let fastest_exact = ordered.iter().find(is_exact).copied();
         let bytes = |result: &RunResult| result.memory.as_ref().map(|memory| memory.technique_bytes);
@@ -48,8 +48,8 @@ impl<'a> Conclusion<'a> {
     }
 }
 
-/// Exactness of a result's technique with its parameters; `None` of a technique that is not known.
-fn exactness(result: &RunResult) -> Option<Exactness> {
+/// Exactness of a result's technique with its parameters at so many samples a pixel; `None` of a technique that is not known.
+fn exactness(result: &RunResult, samples: u32) -> Option<Exactness> {
     let technique = find(&result.technique)?;
     let mut params = params_of(technique);
     for (key, value) in &result.params {
@@ -57,7 +57,7 @@ fn exactness(result: &RunResult) -> Option<Exactness> {
         // A record of another version may have parameters that are gone.
         let _ = set_param(technique, &mut params, key, &text);
     }
-    Some(technique.exactness(&params))
+    Some(exactness_of(technique, &params, samples))
 }
 
 #[cfg(test)]

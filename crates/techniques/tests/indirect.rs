@@ -12,8 +12,8 @@ use afterlight_stages::shared::{
     indirect::{RADIUS, SAMPLES},
     light_view::SourceView,
 };
-use afterlight_techniques::{Exactness, Indirect, Params, Settings, find, registry, scene::Light};
-use common::{Stage, image_of, lights_of_each_kind, psnr};
+use afterlight_techniques::{Indirect, Params, Settings, find, registry, scene::Light};
+use common::{Stage, image_of, least_db, lights_of_each_kind, psnr};
 use glam::{DVec3, Vec3};
 
 /// Writes an image for the eye where `AFTERLIGHT_INDIRECT_IMAGES` names a folder.
@@ -113,9 +113,6 @@ fn forward_gathers_what_f64_gathers() {
     }
 }
 
-/// `forward` shades once a pixel and surface; what shades samples differs from it where pixels are cut.
-const MULTISAMPLED_MIN_DB: f64 = 40.0;
-
 /// Passes that are no technique's own, without those of blended surfaces.
 fn report_of_shared(prepared: &mut Prepared) -> Vec<String> {
     let report = prepared.run().unwrap_or_else(|e| panic!("{e}"));
@@ -152,9 +149,7 @@ fn every_technique_has_the_same_indirect_light() {
             show(&format!("{}-{samples}", info.id), &image);
             let db = psnr(&reference, &image);
             println!("{samples} samples: {} {db:.2} dB", info.id);
-            let (Exactness::Exact { min_psnr_db } | Exactness::Approximate { min_psnr_db, .. }) =
-                info.exactness;
-            let bound_db = if samples == 1 { min_psnr_db } else { MULTISAMPLED_MIN_DB };
+            let bound_db = least_db(*technique, &Params::default(), samples);
             assert!(db >= bound_db, "{} at {samples} samples: {db:.2} dB", info.id);
             let shared: Vec<String> = report_of_shared(&mut prepared);
             assert_eq!(shared, ["shared/rsm"], "{}", info.id);

@@ -6,7 +6,7 @@ use afterlight_oracle::raster::{RayScene, pixel_ray};
 use afterlight_techniques::{
     Exactness, Frame, Info, LightPairs, Params, SHADERS, Settings, Technique, TechniqueError,
     cost::{Cost, Workload},
-    find,
+    exactness_of, find,
     graph::{Graph, ImageHandle},
     registry,
     scene::{Light, LightKind},
@@ -162,7 +162,8 @@ fn all_light_the_same(stage: &Stage, settings: &Settings, within: f64) {
     for (technique, pairs) in &found {
         let id = technique.info().id;
         assert!(pairs.tested >= pairs.lit && pairs.lit > 0.0, "{id}: {pairs:?}");
-        if matches!(technique.info().exactness, Exactness::Exact { .. }) {
+        let exactness = exactness_of(*technique, &Params::default(), settings.samples);
+        if matches!(exactness, Exactness::Exact { .. }) {
             let difference = (pairs.lit - forward.lit).abs() / forward.lit;
             assert!(difference <= within, "{id}: {pairs:?} against {forward:?}, {difference:.5} off");
         }

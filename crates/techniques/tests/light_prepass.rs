@@ -10,7 +10,8 @@ use afterlight_techniques::{
     shader::Shader,
 };
 use common::{
-    Stage, compiled, compiled_with_header, image_of, lights_of_each_kind, psnr, radiance_of, source,
+    Random, Stage, compiled, compiled_with_header, image_of, least_db, lights_of_each_kind, params, psnr,
+    radiance_of, random_camera, source,
 };
 use glam::Vec3;
 
@@ -105,9 +106,142 @@ fn sums_beyond_their_format_stay_numbers() {
         "light_prepass/material.frag",
         "light_prepass/sums.glsl",
         &[(
-            "min(texelFetch(light, ivec2(gl_FragCoord.xy), 0).rgb, vec3(65504.0))",
-            "texelFetch(light, ivec2(gl_FragCoord.xy), 0).rgb",
+            "min(texelFetch(light, sums_pixel, 0).rgb, vec3(65504.0))",
+            "texelFetch(light, sums_pixel, 0).rgb",
         )],
     );
     assert!(not_numbers(Some(unbounded)) > 0, "no sum is beyond its format: the test shows nothing");
+}
+
+/// Writes an image for the eye where `AFTERLIGHT_PREPASS_IMAGES` names a folder.
+fn show(name: &str, image: &Rgba8Image) {
+    let Ok(folder) = std::env::var("AFTERLIGHT_PREPASS_IMAGES") else { return };
+    let file = std::path::Path::new(&folder).join(format!("{name}.png"));
+    afterlight_image::write_png(&file, image).unwrap_or_else(|e| panic!("{e}"));
+}
+
+/// `light-prepass` at four samples with parameters and shaders in the place of its own.
+fn multisampled(
+    stage: &Stage,
+    settings: &Settings,
+    sets: &[(&str, &str)],
+    shaders: Vec<Shader>,
+) -> Rgba8Image {
+    let technique = find("light-prepass").unwrap();
+    image_of(&mut stage.prepare_shaders(technique, settings, &params(technique, sets), shaders))
+}
+
+/// `light_prepass/material.frag#alike` with a part of `alike.glsl` replaced.
+fn alike_mutant(from: &str, to: &str) -> Shader {
+    let path = source("light_prepass/material.frag.glsl");
+    let header = std::fs::read_to_string(source("light_prepass/alike.glsl")).expect("a shader");
+    assert!(header.contains(from), "alike.glsl has changed: found no {from:?}");
+    let header = header.replace(from, to);
+    let whole = [("#include \"light_prepass/alike.glsl\"", header.as_str())];
+    compiled("light_prepass/material.frag#alike", &path, &["ALIKE_PIXELS"], &whole)
+}
+
+/// Pixels that one fragment covers: `deferred-msaa` shades them once, and no background shows in them.
+fn whole_pixels(stage: &Stage, settings: &Settings, reference: &Rgba8Image) -> Vec<bool> {
+    let edges = Settings { view: "edges".to_owned(), ..settings.clone() };
+    let edges = stage.image(find("deferred-msaa").unwrap(), &edges);
+    let mut other = settings.clone();
+    other.environment.background_radiance += Vec3::ONE;
+    let other = stage.image(find("forward").unwrap(), &other);
+    let pixels = |image: &Rgba8Image| image.pixels.chunks_exact(4).map(<[u8]>::to_vec).collect::<Vec<_>>();
+    let all = pixels(&edges).into_iter().zip(pixels(&other)).zip(pixels(reference));
+    all.map(|((edge, other), reference)| edge[..3] == [0; 3] && other == reference).collect()
+}
+
+/// PSNR over some pixels, dB; none where there are few.
+fn psnr_of(a: &Rgba8Image, b: &Rgba8Image, pixels: &[bool]) -> Option<f64> {
+    let (mut sum, mut count) = (0.0, 0);
+    let all = a.pixels.chunks_exact(4).zip(b.pixels.chunks_exact(4)).zip(pixels);
+    for ((a, b), _) in all.filter(|(_, counts)| **counts) {
+        sum += (0..3).map(|i| (f64::from(a[i]) - f64::from(b[i])).powi(2)).sum::<f64>();
+        count += 3;
+    }
+    (count > 300).then(|| 10.0 * (255.0 * 255.0 * f64::from(count) / sum).log10())
+}
+
+/// At several samples a pixel that one fragment covers is as at one sample; edges take light that was gathered for the surface most like them,
+/// within the bounds that are told.
+#[test]
+fn edges_take_the_light_of_similar_surfaces() {
+    let gpu = afterlight_testkit::gpu();
+    let technique = find("light-prepass").unwrap();
+    for (scene, size, lights) in [
+        ("builtin:spheres?segments=24", (160, 90), 20),
+        ("builtin:colonnade?triangles=30000", (160, 90), 100),
+        ("builtin:colonnade?triangles=30000", (320, 180), 100),
+        ("builtin:intersect", (161, 91), 20),
+    ] {
+        let stage = Stage::new(&gpu, scene);
+        let settings = Settings { samples: 4, ..stage.settings(size, lights) };
+        let reference = stage.image(find("forward").unwrap(), &settings);
+        show("forward", &reference);
+        let whole = whole_pixels(&stage, &settings, &reference);
+        let mut found = Vec::new();
+        for set in [[("edge-light", "alike")], [("edge-light", "pixel")]] {
+            let image = multisampled(&stage, &settings, &set, Vec::new());
+            show(set[0].1, &image);
+            let (db, inside) = (psnr(&reference, &image), psnr_of(&reference, &image, &whole));
+            println!("{scene} {size:?}: {set:?}: {db:.2} dB, {inside:.2?} where no edge is");
+            let least = least_db(technique, &params(technique, &set), 4);
+            assert!(db >= least, "{scene} {size:?}: {set:?}: {db:.2} dB, {least} promised");
+            // Few pixels of the spheres hold one triangle alone. A triangle may cover a centre and no sample: its pixel's own light is another's.
+            let asked = !scene.starts_with("builtin:spheres") && set[0].1 == "alike";
+            assert!(
+                !asked || inside.is_some_and(|db| db >= 50.0),
+                "{scene} {size:?}: {set:?}: {inside:.2?} dB where no edge is"
+            );
+            found.push(db);
+        }
+        assert!(
+            found[0] > found[1] + 2.0,
+            "{scene} {size:?}: nothing is gained by similar surfaces: {found:?}"
+        );
+    }
+}
+
+/// Parts of what makes surfaces alike, each left out.
+#[test]
+fn what_makes_surfaces_alike_is_needed() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=30000");
+    let settings = Settings { samples: 4, ..stage.settings((160, 90), 100) };
+    let reference = stage.image(find("forward").unwrap(), &settings);
+    let right = psnr(&reference, &multisampled(&stage, &settings, &[], Vec::new()));
+    for (from, to) in [
+        ("off_m / plane.pixel_m +", ""),
+        ("NORMAL_WEIGHT * (1.0 - dot(normal, s.normal_ws))", "0.0"),
+        ("best = to_pixel", "best = -to_pixel"),
+    ] {
+        let db = psnr(&reference, &multisampled(&stage, &settings, &[], vec![alike_mutant(from, to)]));
+        println!("{to:?} for {from:?}: {db:.2} dB, {right:.2} with it");
+        assert!(db < right - 0.3, "{to:?} for {from:?}: {db:.2} dB, {right:.2} with it: not needed");
+    }
+}
+
+/// Views that nobody chose.
+#[test]
+fn random_views_stay_within_what_is_promised() {
+    let gpu = afterlight_testkit::gpu();
+    let technique = find("light-prepass").unwrap();
+    let mut random = Random(45);
+    for scene in ["builtin:spheres", "builtin:colonnade?triangles=17000&texture=64", "builtin:intersect"] {
+        let stage = Stage::new(&gpu, scene);
+        for view in 0..8 {
+            let camera = random_camera(&stage, &mut random);
+            let lights = [2, 10, 60, 300][(random.unit() * 4.0) as usize];
+            let settings = Settings { samples: 4, ..stage.from(camera, (97, 53), lights) };
+            let reference = stage.image(find("forward").unwrap(), &settings);
+            for set in [[("edge-light", "alike")], [("edge-light", "pixel")]] {
+                let db = psnr(&reference, &multisampled(&stage, &settings, &set, Vec::new()));
+                println!("{scene} view {view}, {lights} lights: {set:?}: {db:.2} dB");
+                let least = least_db(technique, &params(technique, &set), 4);
+                assert!(db >= least, "{scene} view {view}: {set:?}: {db:.2} dB, {least} promised");
+            }
+        }
+    }
 }

@@ -4,9 +4,9 @@ mod common;
 
 use afterlight_stages::lights::step::asked;
 use afterlight_techniques::{
-    Params, Settings, Technique, Transparency, find, graph::gpu, registry, scene::Camera,
+    Params, Settings, Shadows, Technique, Transparency, find, graph::gpu, registry, scene::Camera,
 };
-use common::{Stage, image_of, params, psnr};
+use common::{Stage, image_of, least_db, params, psnr};
 use glam::Vec3;
 
 /// Least PSNR to `forward` at as many samples, dB (contract).
@@ -29,6 +29,9 @@ fn ways(id: &str) -> &'static [&'static [(&'static str, &'static str)]] {
             &[("fill", "cache"), ("reference-bits", "8")],
         ],
         "dais-list" => &[&[], &[("bands", "1")], &[("bands", "3")]],
+        "deferred-ssaa" => &[&[], &[("position", "sample")]],
+        "deferred-msaa" => &[&[], &[("position", "sample")], &[("edges", "centroid")]],
+        "light-prepass" => &[&[], &[("edge-light", "pixel")]],
         _ => &[&[]],
     }
 }
@@ -60,9 +63,10 @@ fn all_agree(stage: &Stage, settings: &Settings, what: &str, runs: usize) {
             for run in 0..runs {
                 let db = psnr(&reference, &image_of(&mut prepared));
                 println!("{what}, {samples} samples: {name} run {run}: {db:.2} dB");
+                let least_db = least_db(technique, &params, samples);
                 assert!(
-                    db >= MIN_PSNR_DB,
-                    "{what}, {samples} samples: {name} run {run}: {db:.2} dB to forward"
+                    db >= least_db,
+                    "{what}, {samples} samples: {name} run {run}: {db:.2} dB to forward, {least_db} promised"
                 );
             }
         }
@@ -103,6 +107,30 @@ fn with_an_eye_on_the_ground() {
     let target = Vec3::new(-4.533_236, -0.242_336_78, 2.401_406);
     let camera = Camera::look_at("on the ground", eye, target, 84.190_74_f32.to_radians(), 0.000_3);
     all_agree(&stage, &stage.from(camera, (96, 54), 9), "on the ground", 1);
+}
+
+/// Views whose light changes within pixels: few of them, scenes small in them, sharp shadows. `deferred-ssaa` and
+/// `deferred-msaa` were 34.7 and 35.8 dB off in the first two, when they lit surfaces at their samples.
+fn views_of_few_pixels(gpu: &gpu::Device) -> Vec<(Stage, Settings, &'static str)> {
+    let mut views = Vec::new();
+    let stage = Stage::new(gpu, "builtin:spheres");
+    let settings = stage.settings((96, 54), 10);
+    views.push((stage, settings, "spheres of 96x54"));
+    let stage = Stage::new(gpu, "builtin:colonnade?triangles=30000");
+    let settings = stage.settings((160, 90), 5).with_effects(|effects| {
+        effects.shadows.method = Shadows::Map;
+        effects.shadows.map_size_px = 4096;
+    });
+    views.push((stage, settings, "sharp shadows"));
+    views
+}
+
+#[test]
+fn where_light_changes_within_pixels() {
+    let gpu = afterlight_testkit::gpu();
+    for (stage, settings, what) in views_of_few_pixels(&gpu) {
+        all_agree(&stage, &settings, what, 1);
+    }
 }
 
 /// One sample is not several: a comparison that cannot tell would prove nothing.
@@ -329,6 +357,40 @@ fn filters_store_fewer_samples() {
     }
 }
 
+/// The paper's detector has a known answer before a plane that faces the eye: depth is the near distance over the view distance, and that of
+/// the background 0. A threshold below the difference finds its edge, one above does not; by distances the background is always an edge.
+#[test]
+fn depth_edges_by_range_are_the_papers() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:edge");
+    let (near_m, distance_m) = (0.1, 2.0);
+    let camera = Camera::look_at("front", Vec3::Z * distance_m, Vec3::ZERO, 0.8, near_m);
+    let depth = near_m / distance_m;
+    for samples in counts(&gpu) {
+        let settings = Settings { samples, ..stage.from(camera.clone(), (96, 54), 0) };
+        for fill in ["compute", "raster"] {
+            let greys = |measure: &str, threshold: f32| {
+                let threshold = threshold.to_string();
+                let sets = [
+                    ("fill", fill),
+                    ("filter", "depth-edges"),
+                    ("depth-edges", measure),
+                    ("edge-threshold", &threshold),
+                ];
+                let image = list_image(&stage, &settings, &sets);
+                let white = image.pixels.chunks_exact(4).map(|p| p[0]).max().unwrap_or(0);
+                image.pixels.chunks_exact(4).filter(|p| p[0] > 0 && p[0] < white).count()
+            };
+            let below = greys("range", 0.95 * depth);
+            assert!(
+                below > 20,
+                "{samples} samples, {fill}: {below} grey pixels at a threshold below the range"
+            );
+            assert_eq!(greys("range", 1.05 * depth), 0, "{samples} samples, {fill}: above the range");
+            assert_eq!(greys("relative", 1.05 * depth), below, "{samples} samples, {fill}: by distances");
+        }
+    }
+}
 /// Masked surfaces of one depth: where early tests gave the stencil bit to fragments without alpha, 125 of 2 M pixels of this
 /// view at 1920×1080 lacked samples, so the view is large.
 #[test]

@@ -5,10 +5,10 @@ use afterlight_stages::lights::{
     step::{Lights, StepParams, asked},
 };
 use afterlight_techniques::{
-    DrawOrder, DrawParams, Params,
+    Condition, DrawOrder, DrawParams, Exactness, Params,
     dais::{CacheParams, DaisParams, Fill, Rate, RateParams},
     deferred::DeferredParams,
-    find,
+    exactness_of, find,
     gbuffer_list::{Filter, FilterParams, GbufferListParams},
     params::{AutoOr, NoParams, ParamSet as _, Words},
     params_of, registry,
@@ -152,4 +152,43 @@ fn lights_are_found_by_type() {
     assert_eq!(of("dais"), Some(Lights::Auto));
     assert_eq!(of("tiled"), None);
     assert_eq!(StepParams::default().light_step().lights, Lights::Auto);
+}
+
+/// What the paper's table promises of the hardware's multisampling is kept, or told.
+#[test]
+fn multisampling_of_the_papers_is_kept_or_told() {
+    for technique in registry() {
+        let info = technique.info();
+        let told = info.departures.iter().any(|departure| departure.starts_with("one sample a pixel alone"));
+        let keeps = info.samples.iter().any(|samples| *samples > 1);
+        let promised = info.appendix_a.hardware_msaa == "y";
+        assert!(!promised || keeps || told, "{}: one sample a pixel, and no departure says so", info.id);
+        assert!(!(keeps && told), "{}: several samples, and a departure says one", info.id);
+    }
+}
+
+/// Ways that are further from `forward` than the default name parameters that there are, and count where their conditions hold.
+#[test]
+fn approximations_hold_under_their_conditions() {
+    for technique in registry() {
+        let info = technique.info();
+        for way in info.approximations {
+            let mut params = params_of(*technique);
+            for condition in way.when {
+                if let Condition::Param(key, value) = condition {
+                    let before = params.get(key);
+                    params.set(key, value).unwrap_or_else(|e| panic!("{}: {e}", info.id));
+                    let differs = before.as_deref() != Some(*value);
+                    assert!(differs || way.when.len() > 1, "{}: {key}={value} is the default", info.id);
+                }
+            }
+            assert!(!way.bound.is_empty() && way.min_psnr_db > 0.0, "{}: {way:?}", info.id);
+            let found = exactness_of(*technique, &params, 4);
+            let expected = Exactness::Approximate { bound: way.bound, min_psnr_db: way.min_psnr_db };
+            assert_eq!(found, expected, "{}: {}", info.id, way.when_text());
+        }
+        assert_eq!(exactness_of(*technique, &Params::default(), 1), info.exactness, "{}", info.id);
+    }
+    let prepass = find("light-prepass").expect("light-prepass");
+    assert!(matches!(exactness_of(prepass, &Params::default(), 4), Exactness::Approximate { .. }));
 }

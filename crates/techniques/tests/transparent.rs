@@ -6,7 +6,7 @@ use afterlight_oracle::raster::{RayScene, pixel_ray};
 use afterlight_renderer::Renderer;
 use afterlight_stages::compose::transparent::SORTED_TRIANGLES_MAX;
 use afterlight_techniques::{
-    Exactness, Frame, Info, Params, SHADERS, Settings, Technique, TechniqueError, Transparency,
+    Frame, Info, Params, SHADERS, Settings, Technique, TechniqueError, Transparency,
     cost::{Cost, Workload},
     find,
     graph::{BufferRole, Graph, ImageHandle, ImageInfo, Load, PassRole, gpu::vk},
@@ -16,7 +16,7 @@ use afterlight_techniques::{
     },
     shader::Shader,
 };
-use common::{Stage, compiled, image_of, lights_of_each_kind, psnr, radiance_of, source};
+use common::{Stage, compiled, image_of, least_db, lights_of_each_kind, psnr, radiance_of, source};
 use glam::{Affine3A, DVec3, Quat, Vec3};
 
 /// Squares that face +z of their own space, one mesh, placed in the world.
@@ -458,12 +458,6 @@ fn aisle(stage: &Stage, size: (u32, u32)) -> Settings {
     stage.from(camera, size, 100)
 }
 
-fn min_psnr(exactness: Exactness) -> f64 {
-    match exactness {
-        Exactness::Exact { min_psnr_db } | Exactness::Approximate { min_psnr_db, .. } => min_psnr_db,
-    }
-}
-
 /// Share of pixels that differ.
 fn differing(a: &afterlight_image::Rgba8Image, b: &afterlight_image::Rgba8Image) -> f64 {
     let differ = a.pixels.chunks_exact(4).zip(b.pixels.chunks_exact(4)).filter(|(a, b)| a != b).count();
@@ -487,7 +481,7 @@ fn every_technique_agrees_with_forward_through_the_panes_of_the_colonnade() {
             let mut prepared = stage.prepare(*technique, &settings);
             let db = psnr(&reference, &image_of(&mut prepared));
             println!("{} at {samples} samples: {db:.2} dB", info.id);
-            let least = if samples == 1 { min_psnr(info.exactness) } else { 40.0 };
+            let least = least_db(*technique, &Params::default(), samples);
             assert!(db >= least, "{} at {samples} samples: {db:.2} dB to forward", info.id);
             assert!(psnr(&without, &image_of(&mut prepared)) < 40.0, "{}: no panes go unseen", info.id);
 

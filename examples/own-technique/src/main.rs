@@ -48,6 +48,7 @@ static INFO: Info = Info {
     samples: &[1],
     views: &[],
     tessellation: false,
+    ..Info::USUAL
 };
 
 impl Technique for Toon {

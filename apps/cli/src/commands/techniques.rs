@@ -30,6 +30,8 @@ fn technique_json(technique: &dyn Technique) -> Value {
         "answers": info.answers,
         "appendix_a": info.appendix_a,
         "exactness": info.exactness,
+        "approximations": info.approximations,
+        "departures": info.departures,
         "params": params_of(technique).infos(),
         "needs": info.needs.iter().map(|need| need.name).collect::<Vec<_>>(),
         "samples": info.samples,
@@ -75,6 +77,13 @@ fn technique_text(technique: &dyn Technique) -> String {
             writeln!(text, "   approximate, {bound}; at least {min_psnr_db} dB to forward")
         }
     };
+    for way in info.approximations {
+        let (when, bound, least_db) = (way.when_text(), way.bound, way.min_psnr_db);
+        let _ = writeln!(text, "   with {when}: approximate, {bound}; at least {least_db} dB to forward");
+    }
+    for departure in info.departures {
+        let _ = writeln!(text, "   differs    {departure}");
+    }
     let samples: Vec<String> = info.samples.iter().map(u32::to_string).collect();
     let _ = writeln!(text, "   samples    {}", samples.join(", "));
     if !info.needs.is_empty() {

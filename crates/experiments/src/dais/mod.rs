@@ -77,34 +77,49 @@ const VIEWS_MAX: u32 = 10_000;
 pub(crate) enum Kind {
     /// The baseline.
     Deferred,
-    /// DAIS as it is by default here, which the paper does not have: the triangle buffer is filled in compute (tessellated surfaces
-    /// fill it as the paper's do).
+    /// DAIS whose triangle buffer is filled in compute, which the paper does not have (tessellated surfaces fill it as the paper's do). The
+    /// raster part finds what shows, as it does for the baseline.
     Resolve,
+    /// The same where what shows is found in compute too, as by default on a GPU: another rasteriser than the baseline's.
+    ResolveCompute,
     /// The paper's DAIS.
     Cache,
     List,
     /// As [`Kind::Resolve`], indirect light at half the rate.
     MultiRate,
+    /// As [`Kind::ResolveCompute`], indirect light at half the rate.
+    MultiRateCompute,
     /// The paper's multi-rate DAIS.
     MultiRateCache,
 }
 
 impl Kind {
-    pub const ALL: [Kind; 6] =
-        [Kind::Deferred, Kind::Resolve, Kind::Cache, Kind::List, Kind::MultiRate, Kind::MultiRateCache];
+    /// What has the baseline's rasteriser first, then what has another.
+    pub const ALL: [Kind; 8] = [
+        Kind::Deferred,
+        Kind::Resolve,
+        Kind::Cache,
+        Kind::List,
+        Kind::MultiRate,
+        Kind::MultiRateCache,
+        Kind::ResolveCompute,
+        Kind::MultiRateCompute,
+    ];
 
     pub fn technique(self) -> &'static str {
         match self {
             Kind::Deferred => "deferred-dedup",
-            Kind::Resolve | Kind::Cache => "dais",
+            Kind::Resolve | Kind::ResolveCompute | Kind::Cache => "dais",
             Kind::List => "dais-list",
-            Kind::MultiRate | Kind::MultiRateCache => "dais-multirate",
+            Kind::MultiRate | Kind::MultiRateCompute | Kind::MultiRateCache => "dais-multirate",
         }
     }
 
     pub fn label(self) -> &'static str {
         match self {
             Kind::Cache => "dais, fill=cache",
+            Kind::ResolveCompute => "dais, visibility=compute",
+            Kind::MultiRateCompute => "dais-multirate, visibility=compute",
             Kind::MultiRateCache => "dais-multirate, fill=cache",
             _ => self.technique(),
         }
@@ -114,17 +129,19 @@ impl Kind {
     fn params(self) -> &'static [(&'static str, &'static str)] {
         match self {
             Kind::Cache | Kind::MultiRateCache => &[("fill", "cache")],
-            _ => &[],
+            Kind::Resolve | Kind::MultiRate => &[("visibility", "raster")],
+            Kind::ResolveCompute | Kind::MultiRateCompute => &[("visibility", "compute")],
+            Kind::Deferred | Kind::List => &[],
         }
     }
 
-    /// The paper's line; the default way to fill stands beside the paper's as well.
+    /// The paper's line; ways to fill that it does not have stand beside it as well.
     pub fn paper(self, scene: &PaperScene) -> PaperRow {
         match self {
             Kind::Deferred => scene.deferred,
-            Kind::Resolve | Kind::Cache => scene.dais,
+            Kind::Resolve | Kind::ResolveCompute | Kind::Cache => scene.dais,
             Kind::List => scene.list,
-            Kind::MultiRate | Kind::MultiRateCache => scene.multirate,
+            Kind::MultiRate | Kind::MultiRateCompute | Kind::MultiRateCache => scene.multirate,
         }
     }
 }
@@ -478,9 +495,17 @@ mod tests {
         let cache = all.iter().find(|column| column.kind == Kind::Cache).and_then(|c| c.setup.as_ref());
         let chosen = &cache.expect("in every build").chosen;
         assert_eq!(chosen.params.get("fill").as_deref(), Some("cache"));
+        // Like against like first: no column leaves its rasteriser to what the device prefers, and another than the baseline's comes last.
+        let visibility = |column: &Column| {
+            let setup = column.setup.as_ref().expect("in every build");
+            setup.chosen.params.get("visibility").unwrap_or_else(|| "raster".to_owned())
+        };
+        let filled_by_raster = |column: &&Column| !matches!(column.kind, Kind::Cache | Kind::MultiRateCache);
+        let found: Vec<String> = all.iter().filter(filled_by_raster).map(visibility).collect();
+        assert_eq!(found, ["raster", "raster", "raster", "raster", "compute", "compute"]);
         let of =
             |id: &str| columns(&Conditions { techniques: vec![id.to_owned()], ..conditions() }, &Kind::ALL);
-        assert_eq!(of("dais").expect("known").len(), 2);
+        assert_eq!(of("dais").expect("known").len(), 3);
         assert!(of("tiled").is_err());
     }
 

@@ -275,10 +275,10 @@ fn claims_of(source: &Source, columns: &[Column], cells: &[Cell], as_in_paper: b
         let (what, ratio, paper) = match column.kind {
             Kind::Deferred => return None,
             Kind::List => ("memory", cell.memory_over_deferred, claimed.map(|c| c.list_memory)),
-            Kind::Resolve | Kind::Cache => {
+            Kind::Resolve | Kind::ResolveCompute | Kind::Cache => {
                 ("frame time", cell.frame_over_deferred, claimed.map(|c| c.dais_time))
             }
-            Kind::MultiRate | Kind::MultiRateCache => {
+            Kind::MultiRate | Kind::MultiRateCompute | Kind::MultiRateCache => {
                 ("frame time", cell.frame_over_deferred, claimed.map(|c| c.multirate_time))
             }
         };

@@ -15,7 +15,7 @@ use afterlight_report::text::{self, grouped, number_text, status_text};
 use afterlight_report::{Axes, Chart, Line, bytes_text, ms_text};
 use afterlight_techniques::cost::{Cost, Workload};
 use afterlight_techniques::{
-    Exactness, Post,
+    Exactness, Post, exactness_of,
     stages::lights::step::{Lights, asked},
     view,
 };
@@ -449,7 +449,8 @@ fn count_pairs(session: &Session, setup: &Setup) -> Result<RunResult, LabError> 
 /// Lit pairs of a frame: those of the first exact technique at the fewest samples.
 fn lit_pairs(setups: &[Setup], pairs: &[Option<Pairs>]) -> Option<f64> {
     let exact = |setup: &Setup| {
-        matches!(setup.chosen.technique.exactness(&setup.chosen.params), Exactness::Exact { .. })
+        let exactness = exactness_of(setup.chosen.technique, &setup.chosen.params, setup.samples);
+        matches!(exactness, Exactness::Exact { .. })
     };
     let counted = setups.iter().zip(pairs).filter(|(setup, _)| exact(setup));
     let counted = counted.filter_map(|(setup, pairs)| Some((setup.samples, (*pairs)?.lit)));
@@ -460,7 +461,8 @@ fn lit_pairs(setups: &[Setup], pairs: &[Option<Pairs>]) -> Option<f64> {
 /// device or of their lists.
 fn judge_lit(setups: &[Setup], results: &mut [RunResult], pairs: &[Option<Pairs>]) {
     let exact = |setup: &Setup| {
-        matches!(setup.chosen.technique.exactness(&setup.chosen.params), Exactness::Exact { .. })
+        let exactness = exactness_of(setup.chosen.technique, &setup.chosen.params, setup.samples);
+        matches!(exactness, Exactness::Exact { .. })
     };
     for (index, setup) in setups.iter().enumerate().filter(|(_, setup)| exact(setup)) {
         let Some(found) = pairs[index].filter(|_| results[index].status == Status::Ok) else { continue };

@@ -9,7 +9,7 @@ use afterlight_lab::{FrameSpec, LabError, Listener, Session, Setup, choose, meas
 use afterlight_measure::{RunResult, Spread, Status};
 use afterlight_report::text::{self, grouped, number_text, status_text};
 use afterlight_report::{bytes_text, ms_text};
-use afterlight_techniques::Post;
+use afterlight_techniques::{Post, params::choices};
 use serde::{Deserialize, Serialize};
 
 use crate::kit::{
@@ -108,6 +108,36 @@ const LISTS: [(&str, &[(&str, &str)]); 3] = [
     (", raster fill", &[("fill", "raster"), ("position", "depth")]),
 ];
 
+choices! {
+    /// How surfaces find their lights: the same of a column and of what it is compared to.
+    enum LightsFound {
+        /// Every surface visits all, as the paper's do.
+        All = "all",
+        /// By lists: of the clusters of the view, or of what the technique has in their place.
+        Clusters = "clusters",
+    }
+}
+
+impl LightsFound {
+    /// What it adds to the label of a column.
+    fn label(self) -> &'static str {
+        match self {
+            LightsFound::All => "",
+            LightsFound::Clusters => ", clusters",
+        }
+    }
+}
+
+/// Techniques that have one way to find lights.
+const PLAIN_LIGHTS: [&str; 3] = ["forward", "tiled", "clustered-forward"];
+
+/// What a column is beside its set-up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Column {
+    paper: PaperColumn,
+    lights: LightsFound,
+}
+
 /// What a set-up is in the paper's table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum PaperColumn {
@@ -148,12 +178,14 @@ struct Cell {
     samples: u32,
     post: &'static str,
     lights: u32,
+    /// How surfaces find them: over those of the baseline that finds them in the same way.
+    lights_found: LightsFound,
     /// Vertices of the paper's scene.
     paper_vertices: Option<u32>,
     status: Status,
     reason: Option<String>,
     frame_ms: Option<Spread>,
-    /// Over the baseline's median in the same run.
+    /// Over the median, in the same run, of the baseline that finds lights in the same way.
     over_baseline: Option<f64>,
     paper_ms: Option<f64>,
     paper_over_baseline: Option<f64>,
@@ -197,9 +229,8 @@ struct Table2 {
 fn run(spec: &Spec, listener: &dyn Listener) -> Result<Outcome, LabError> {
     check_run(spec.scale, spec.frames, &spec.frame)?;
     let size = at_size(&spec.frame, spec.scale);
-    let (setups, columns): (Vec<Setup>, Vec<PaperColumn>) = setups(spec)?.into_iter().unzip();
+    let (setups, columns): (Vec<Setup>, Vec<Column>) = setups(spec)?.into_iter().unzip();
     let labels: Vec<&str> = setups.iter().map(|setup| setup.label.as_str()).collect();
-    let baseline = labels.iter().position(|label| label.starts_with("deferred-ssaa"));
     let mut notes = notes(spec, &size);
     let (mut rows, mut sections, mut duels, mut failed) = (Vec::new(), Vec::new(), Vec::new(), None);
     for scene in scenes(spec) {
@@ -216,7 +247,7 @@ fn run(spec: &Spec, listener: &dyn Listener) -> Result<Outcome, LabError> {
             }
             let results: Vec<RunResult> = found.measured.into_iter().map(|one| one.result).collect();
             let paper = scene.paper.zip(PAPER_LIGHTS.iter().position(|count| *count == lights));
-            let cells = cells(&setups, &columns, &results, baseline, lights, paper);
+            let cells = cells(&setups, &columns, &results, lights, paper);
             failed = failed.or_else(|| broken_off(labels.iter().copied().zip(&results)));
             duels.extend(duels_of(&scene.source, &cells));
             let table = Table {
@@ -251,48 +282,68 @@ fn scenes(spec: &Spec) -> Vec<Scene> {
     PAPER.figures.iter().map(scene).collect()
 }
 
-/// The columns, those of the techniques that are asked for.
-fn setups(spec: &Spec) -> Result<Vec<(Setup, PaperColumn)>, LabError> {
+/// The columns, those of the techniques that are asked for. What has the choice stands there once for each way to find lights, so
+/// that like is compared to like; post-processing and filters, which change nothing about lights, with all lights alone.
+fn setups(spec: &Spec) -> Result<Vec<(Setup, Column)>, LabError> {
     let counts = &spec.sample_counts;
     let Some(&few) = counts.first() else {
         return Err(LabError::setting("samples", "none", "one or more numbers of samples a pixel"));
     };
-    let mut all = vec![
-        (Setup::new("deferred 1x", 1, "deferred", &[])?, PaperColumn::None),
-        (Setup::new("tiled 1x", 1, "tiled", &[])?, PaperColumn::None),
-    ];
+    let mut all = Vec::new();
+    for &found in LightsFound::ALL {
+        let lights = [("lights", found.name())];
+        let column = Column { paper: PaperColumn::None, lights: found };
+        let mut add = |label: &str, samples, technique, params: &[_], paper| -> Result<(), LabError> {
+            let params = match PLAIN_LIGHTS.contains(&technique) {
+                true => params.to_vec(),
+                false => [params, &lights].concat(),
+            };
+            let label = format!("{label}{}", found.label());
+            all.push((Setup::new(label, samples, technique, &params)?, Column { paper, ..column }));
+            Ok(())
+        };
+        add("deferred 1x", 1, "deferred", &[], PaperColumn::None)?;
+        match found {
+            LightsFound::All => add(&format!("forward {few}x"), few, "forward", &[], PaperColumn::None)?,
+            LightsFound::Clusters => {
+                add("tiled 1x", 1, "tiled", &[], PaperColumn::None)?;
+                add(&format!("clustered-forward {few}x"), few, "clustered-forward", &[], PaperColumn::None)?;
+            }
+        }
+        for technique in ["deferred-ssaa", "deferred-msaa", "deferred-dedup"] {
+            let is_papers = technique == "deferred-ssaa" && few == 4 && found == LightsFound::All;
+            let paper = if is_papers { PaperColumn::Msaa4 } else { PaperColumn::None };
+            add(&format!("{technique} {few}x"), few, technique, &[], paper)?;
+        }
+        for (variant, params) in LISTS {
+            for &samples in counts {
+                let paper = match (samples, found) {
+                    (4, LightsFound::All) => PaperColumn::List4,
+                    (8, LightsFound::All) => PaperColumn::List8,
+                    _ => PaperColumn::None,
+                };
+                let label = format!("gbuffer-list {samples}x{variant}");
+                add(&label, samples, "gbuffer-list", params, paper)?;
+            }
+        }
+    }
+    let all_lights = [("lights", LightsFound::All.name())];
+    let plain = Column { paper: PaperColumn::None, lights: LightsFound::All };
     for post in Post::ALL.iter().copied().filter(|post| *post != Post::None) {
         let label = format!("deferred 1x, {}", post.name());
-        all.push((Setup::new(label, 1, "deferred", &[])?.post(post), PaperColumn::None));
-    }
-    all.push((Setup::new(format!("forward {few}x"), few, "forward", &[])?, PaperColumn::None));
-    for technique in ["deferred-ssaa", "deferred-msaa", "deferred-dedup"] {
-        let is_papers = technique == "deferred-ssaa" && few == 4;
-        let column = if is_papers { PaperColumn::Msaa4 } else { PaperColumn::None };
-        all.push((Setup::new(format!("{technique} {few}x"), few, technique, &[("lights", "all")])?, column));
-    }
-    for (variant, params) in LISTS {
-        for &samples in counts {
-            let column = match samples {
-                4 => PaperColumn::List4,
-                8 => PaperColumn::List8,
-                _ => PaperColumn::None,
-            };
-            let label = format!("gbuffer-list {samples}x{variant}");
-            all.push((Setup::new(label, samples, "gbuffer-list", params)?, column));
-        }
+        all.push((Setup::new(label, 1, "deferred", &all_lights)?.post(post), plain));
     }
     for filter in FILTERS {
         for &samples in counts {
             let label = format!("gbuffer-list {samples}x, {}", filter.name);
-            all.push((Setup::new(label, samples, "gbuffer-list", filter.params)?, PaperColumn::None));
+            let params = [filter.params, &all_lights].concat();
+            all.push((Setup::new(label, samples, "gbuffer-list", &params)?, plain));
         }
     }
     let wanted = choose("techniques", &spec.techniques, &[])?;
     all.retain(|(setup, _)| wanted.iter().any(|one| one.id() == setup.chosen.id()));
     if all.is_empty() {
-        let expected =
-            "some of: deferred, tiled, forward, deferred-ssaa, deferred-msaa, deferred-dedup, gbuffer-list";
+        let expected = "some of: deferred, tiled, forward, clustered-forward, deferred-ssaa, deferred-msaa, deferred-dedup, gbuffer-list";
         return Err(LabError::setting("techniques", spec.techniques.join(","), expected));
     }
     Ok(all)
@@ -300,28 +351,36 @@ fn setups(spec: &Spec) -> Result<Vec<(Setup, PaperColumn)>, LabError> {
 
 fn cells(
     setups: &[Setup],
-    columns: &[PaperColumn],
+    columns: &[Column],
     results: &[RunResult],
-    baseline: Option<usize>,
     lights: u32,
     paper: Option<(&PaperScene, usize)>,
 ) -> Vec<Cell> {
     let median_ms = |result: &RunResult| result.frame_ms.map(|frame| frame.median);
-    let baseline_ms = baseline.and_then(|index| median_ms(&results[index]));
-    let cell = |((setup, column), result): ((&Setup, &PaperColumn), &RunResult)| {
+    // Multisampling whose surfaces find their lights in the same way.
+    let baseline_ms = |lights: LightsFound| {
+        let mut all = setups.iter().zip(columns).zip(results);
+        let is_baseline =
+            |setup: &Setup, column: &Column| setup.chosen.id() == "deferred-ssaa" && column.lights == lights;
+        median_ms(all.find(|((setup, column), _)| is_baseline(setup, column))?.1)
+    };
+    let cell = |((setup, column), result): ((&Setup, &Column), &RunResult)| {
         let line = paper.map(|(scene, index)| scene.ms[index]);
-        let paper_ms = line.and_then(|line| line.of(*column));
+        let paper_ms = line.and_then(|line| line.of(column.paper));
         Cell {
             column: setup.label.clone(),
             technique: result.technique.clone(),
             samples: setup.samples,
             post: setup.post.name(),
             lights,
+            lights_found: column.lights,
             paper_vertices: paper.map(|(scene, _)| scene.vertices),
             status: result.status,
             reason: result.reason.clone().filter(|_| result.status != Status::Ok),
             frame_ms: result.frame_ms,
-            over_baseline: median_ms(result).zip(baseline_ms).map(|(ms, baseline)| ms / baseline),
+            over_baseline: median_ms(result)
+                .zip(baseline_ms(column.lights))
+                .map(|(ms, baseline)| ms / baseline),
             paper_ms,
             paper_over_baseline: paper_ms.zip(line).map(|(ms, line)| ms / line.msaa_4x),
             paper_device: paper_ms.map(|_| paper_device()),
@@ -334,7 +393,8 @@ fn cells(
 fn duels_of(scene: &str, cells: &[Cell]) -> Vec<Duel> {
     let is_plain = |cell: &&Cell| {
         let rest = cell.column.strip_prefix(&format!("gbuffer-list {}x", cell.samples));
-        rest.is_some_and(|rest| LISTS.iter().any(|(variant, _)| *variant == rest))
+        let variant = rest.map(|rest| rest.strip_suffix(cell.lights_found.label()).unwrap_or(rest));
+        variant.is_some_and(|found| LISTS.iter().any(|(variant, _)| *variant == found))
     };
     let duel = |cell: &Cell| Duel {
         scene: scene.to_owned(),
@@ -360,7 +420,9 @@ fn scores(duels: &[Duel]) -> Vec<Score> {
             of_list.iter().filter_map(|duel| ratio(duel)).filter(|ratio| *ratio < 1.0).count()
         };
         Score {
-            claim: format!("{list} takes less time than deferred-ssaa at the fewest samples"),
+            claim: format!(
+                "{list} takes less time than deferred-ssaa at the fewest samples, lights found in the same way"
+            ),
             list: list.to_owned(),
             wins: wins(|duel| duel.ratio),
             cells: count(|duel| duel.ratio),
@@ -374,7 +436,7 @@ fn scores(duels: &[Duel]) -> Vec<Score> {
 fn notes(spec: &Spec, size: &FrameSpec) -> Vec<String> {
     let mut notes = vec![
         "deferred-ssaa stands for the paper's MSAA; ratios to it carry over between devices, times do not".to_owned(),
-        "lights are seeded; list and multisampled columns visit all of them at every surface, as in the paper".to_owned(),
+        "lights are seeded; surfaces visit all of them, as in the paper, or those of their cluster: columns that say so, over deferred-ssaa by clusters (tiled by its tiles)".to_owned(),
     ];
     if spec.scenes.is_empty() {
         notes.push("builtin:colonnade stands in for the paper's scenes; their vertices are taken for corners of triangles (all three numbers are multiples of three), a third of them triangles".to_owned());
@@ -471,7 +533,7 @@ mod tests {
         Spec { techniques: ids.iter().map(|id| (*id).to_owned()).collect(), ..Spec::default() }
     }
 
-    fn split(spec: &Spec) -> (Vec<Setup>, Vec<PaperColumn>) {
+    fn split(spec: &Spec) -> (Vec<Setup>, Vec<Column>) {
         setups(spec).expect("known").into_iter().unzip()
     }
 
@@ -497,17 +559,15 @@ mod tests {
         let mut duels = Vec::new();
         for scene in &PAPER.figures {
             for (index, lights) in PAPER_LIGHTS.into_iter().enumerate() {
-                duels.extend(duels_of(
-                    "s",
-                    &cells(&setups, &columns, &results, None, lights, Some((scene, index))),
-                ));
+                duels
+                    .extend(duels_of("s", &cells(&setups, &columns, &results, lights, Some((scene, index)))));
             }
         }
         let scores = scores(&duels);
         let of = |list: &str| scores.iter().find(|score| score.list == list).expect("there");
         assert_eq!((of("gbuffer-list 4x").paper_wins, of("gbuffer-list 4x").paper_cells), (4, 6));
         assert_eq!((of("gbuffer-list 8x").paper_wins, of("gbuffer-list 8x").cells), (3, 0));
-        assert_eq!(scores.len(), 6, "{scores:?}");
+        assert_eq!((of("gbuffer-list 4x, clusters").paper_cells, scores.len()), (0, 12), "{scores:?}");
     }
 
     #[test]
@@ -517,22 +577,49 @@ mod tests {
             .iter()
             .map(|setup| {
                 let mut result = RunResult::without_figures(setup.chosen.id(), Status::Ok, "");
-                let ms =
+                let all =
                     if setup.chosen.id() == "deferred-ssaa" { 8.0 } else { 2.0 * f64::from(setup.samples) };
+                // By clusters everything takes a quarter.
+                let ms = if setup.label.ends_with("clusters") { 0.25 * all } else { all };
                 result.frame_ms = Spread::of(&[ms]);
                 result
             })
             .collect();
-        let cells = cells(&setups, &columns, &results, Some(0), 50, Some((&PAPER.figures[0], 1)));
+        let cells = cells(&setups, &columns, &results, 50, Some((&PAPER.figures[0], 1)));
         let of = |column: &str| cells.iter().find(|cell| cell.column == column).expect("there");
         assert_eq!(of("deferred-ssaa 4x").over_baseline, Some(1.0));
         assert_eq!(of("gbuffer-list 4x").over_baseline, Some(1.0));
         assert_eq!(of("gbuffer-list 8x").over_baseline, Some(2.0));
+        assert_eq!(of("gbuffer-list 8x, clusters").over_baseline, Some(2.0), "like over like");
+        assert_eq!(of("gbuffer-list 8x, clusters").paper_ms, None);
         assert_eq!(of("gbuffer-list 8x").paper_ms, Some(14.0772));
         assert_eq!(of("gbuffer-list 8x, edges").paper_ms, None);
         let scores = scores(&duels_of("s", &cells));
         // As fast is no win.
         assert!(scores.iter().all(|score| score.wins == 0 && score.cells == 1), "{scores:?}");
+    }
+
+    /// No column leaves to a default how it finds its lights, and each is compared to one that finds them in the same way.
+    #[test]
+    fn lights_are_found_in_the_same_way() {
+        let (setups, columns) = split(&Spec::default());
+        let mut labels = std::collections::BTreeSet::new();
+        for (setup, column) in setups.iter().zip(&columns) {
+            assert!(labels.insert(setup.label.clone()), "{} stands there twice", setup.label);
+            match setup.chosen.params.get("lights") {
+                Some(lights) => assert_eq!(lights, column.lights.name(), "{}", setup.label),
+                None => assert!(PLAIN_LIGHTS.contains(&setup.chosen.id()), "{}", setup.label),
+            }
+        }
+        for &lights in LightsFound::ALL {
+            let of = |id: &str| {
+                let mut all = setups.iter().zip(&columns);
+                all.any(|(setup, column)| setup.chosen.id() == id && column.lights == lights)
+            };
+            for id in ["deferred-ssaa", "deferred-msaa", "deferred-dedup", "gbuffer-list", "deferred"] {
+                assert!(of(id), "{id} by {lights}");
+            }
+        }
     }
 
     #[test]

@@ -17,7 +17,7 @@ use afterlight_graph::{BufferHandle, BufferRole, Graph, ImageHandle, Load, PassR
 
 use afterlight_cost::{Cost, Workload};
 use afterlight_frame::{
-    ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, OpaqueDepth, Params, Source, SourceSlots,
+    ANY_SAMPLES, Answers, AppendixA, Approximation, Condition, Exactness, Frame, Info, OpaqueDepth, Params, Source, SourceSlots,
     Technique, TechniqueError, TriangleIds, views,
 };
 use afterlight_shader::Shader;
@@ -121,6 +121,7 @@ static INFO: Info = Info {
     appendix_a: APPENDIX_A,
     // Texture gradients are analytic.
     exactness: Exactness::Exact { min_psnr_db: 45.0 },
+    approximations: &[DERIVATIVE_TANGENTS],
     samples: ANY_SAMPLES,
     views: views::TRIANGLES,
     ..Info::USUAL
@@ -146,10 +147,6 @@ impl Technique for Dais {
         }
     }
 
-    fn exactness(&self, params: &Params) -> Exactness {
-        exactness(INFO.exactness, params)
-    }
-
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let params = frame.params.typed::<DaisParams>();
         let lights = params.light_step().method(frame);
@@ -158,17 +155,12 @@ impl Technique for Dais {
     }
 }
 
-/// Exactness of a technique of this family with parameters: `usual`, but for tangents that are found from derivatives.
-pub(crate) fn exactness(usual: Exactness, params: &Params) -> Exactness {
-    match params.typed::<RecordParams>().tangents {
-        Tangents::Vertices => usual,
-        Tangents::Derivatives => Exactness::Approximate { bound: DERIVATIVES_BOUND, min_psnr_db: DERIVATIVES_MIN_PSNR_DB },
-    }
-}
-
-const DERIVATIVES_BOUND: &str =
-    "normal maps are turned where texture coordinates bend, have no area or are not those of the file's tangents";
-const DERIVATIVES_MIN_PSNR_DB: f64 = 10.0;
+/// The paper's tangents, of every technique of this family.
+pub(crate) const DERIVATIVE_TANGENTS: Approximation = Approximation {
+    when: &[Condition::Param("tangents", "derivatives")],
+    bound: "normal maps are turned where texture coordinates bend, have no area or are not those of the file's tangents",
+    min_psnr_db: 10.0,
+};
 
 /// How a technique of this family shades what it has found.
 pub(crate) struct Asked {

@@ -64,6 +64,7 @@ static INFO: Info = Info {
     appendix_a: dais::APPENDIX_A,
     exactness: Exactness::Exact { min_psnr_db: 45.0 },
     needs: &[Need { name: "post-depth coverage", test: |features| features.post_depth_coverage }],
+    approximations: &[dais::DERIVATIVE_TANGENTS],
     samples: MULTIPLE_SAMPLES,
     views: views::TRIANGLES,
     ..Info::USUAL
@@ -84,10 +85,6 @@ impl Technique for DaisList {
 
     fn predict(&self, workload: &Workload, params: &Params) -> Cost {
         cost::dais_list(workload, params.typed::<RecordParams>().floats())
-    }
-
-    fn exactness(&self, params: &Params) -> Exactness {
-        dais::exactness(INFO.exactness, params)
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {

@@ -40,6 +40,7 @@ static INFO: Info = Info {
         bound: "indirect light of a cell's pixels is that of their mean place; without --indirect as dais",
         min_psnr_db: 40.0,
     },
+    approximations: &[dais::DERIVATIVE_TANGENTS],
     samples: &[1, 2, 4, 8],
     views: views::TRIANGLES,
     ..Info::USUAL
@@ -60,10 +61,6 @@ impl Technique for DaisMultirate {
 
     fn predict(&self, workload: &Workload, params: &Params) -> Cost {
         dais::cost::dais(workload, params.typed::<RecordParams>().floats())
-    }
-
-    fn exactness(&self, params: &Params) -> Exactness {
-        dais::exactness(INFO.exactness, params)
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {

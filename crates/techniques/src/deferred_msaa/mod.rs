@@ -11,13 +11,13 @@ use afterlight_graph::{
 
 use afterlight_cost::{Cost, Workload};
 use afterlight_frame::{
-    Answers, AppendixA, Exactness, Frame, Info, MULTIPLE_SAMPLES, OpaqueDepth, Params, Source, Technique,
-    TechniqueError,
+    Answers, AppendixA, Approximation, Condition, Exactness, Frame, Info, MULTIPLE_SAMPLES, OpaqueDepth,
+    Params, Source, Technique, TechniqueError, set_constants,
 };
 use afterlight_shader::Shader;
 use afterlight_stages::{
     lights::step::{self, LightMethod, StepParams},
-    surfaces::samples::{SampleBuffer, emission_variant},
+    surfaces::samples::{EdgeParams, PositionParams, SampleBuffer, emission_variant},
     surfaces::shade,
     surfaces::{
         samples::{self, emission_tag},
@@ -55,11 +55,35 @@ static INFO: Info = Info {
         rates_decoupled: "n, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
+    approximations: &[samples::AT_SAMPLES, BY_CENTROIDS],
+    departures: &[
+        "surfaces are lit at the pixel's centre, as forward shading does; the paper's place is position=sample",
+        "pixels that hold several fragments are edges whatever centroids tell; the paper's are edges=centroid",
+        "light is accumulated in registers and averaged at once: the paper has a multisampled accumulation buffer and a composition pass",
+        "a loop over all lights where the stencil buffer tells edges, with at most 16 lights by default; the paper's light volumes are lights=volumes",
+    ],
     needs: &[samples::STANDARD_LOCATIONS],
     samples: MULTIPLE_SAMPLES,
     views: shade::VIEWS,
     ..Info::USUAL
 };
+
+/// What marks by centroids alone come to.
+const BY_CENTROIDS: Approximation = Approximation {
+    when: &[Condition::Param("edges", "centroid")],
+    bound: "triangles that intersect in a pixel are shaded as one; so are silhouettes where the device's centroids tell no edge",
+    min_psnr_db: 25.0,
+};
+
+/// Specialization constant of the source that reads positions.
+fn position_constant(frame: &Frame<'_>) -> (&'static str, u32) {
+    ("AT_SAMPLES", frame.params.typed::<PositionParams>().at_samples())
+}
+
+/// Specialization constant of what reads marks of edges.
+fn edge_constant(frame: &Frame<'_>) -> (&'static str, u32) {
+    ("COMPARES_FRAGMENTS", frame.params.typed::<EdgeParams>().compares_fragments())
+}
 
 /// Writes the reference wherever a fragment is.
 const MARK: StencilTest = test(vk::CompareOp::ALWAYS, vk::StencilOp::REPLACE);
@@ -82,6 +106,8 @@ impl Technique for DeferredMsaa {
 
     fn params(&self) -> Params {
         Params::of(StepParams::default())
+            .and(Params::of(PositionParams::default()))
+            .and(Params::of(EdgeParams::default()))
     }
 
     fn predict(&self, workload: &Workload, _: &Params) -> Cost {
@@ -105,6 +131,7 @@ impl Technique for DeferredMsaa {
                 };
                 shade::shade(graph, frame, (INFO.id, lights), source, &surfaces, &|pass| {
                     filled.bind(pass);
+                    set_constants(pass, [position_constant(frame), edge_constant(frame)]);
                 })?
             }
         };
@@ -129,11 +156,12 @@ fn shade_by_stencil(
         BufferRole::Targets,
         frame.image_info(vk::Format::R16G16B16A16_SFLOAT),
     );
-    let samples = [("SAMPLES", frame.samples)];
+    let samples = [("SAMPLES", frame.samples), edge_constant(frame)];
     let mark = shade::full_screen(frame, "surfaces/samples/mark.frag", &samples)?.stencil(MARK);
     let shaded = |rate: &str| {
         let fragment = emission_variant(frame, &format!("deferred_msaa/shade.frag#{rate}"));
-        let state = shade::full_screen(frame, &fragment, &shade::shade_constants(frame, frame.samples))?;
+        let [samples, view] = shade::shade_constants(frame, frame.samples);
+        let state = shade::full_screen(frame, &fragment, &[samples, view, position_constant(frame)])?;
         Ok::<_, TechniqueError>(state.stencil(MARKED).depth(DepthTest::OFF))
     };
     let (at_pixels, at_samples) = (shaded("pixel")?, shaded("sample")?);

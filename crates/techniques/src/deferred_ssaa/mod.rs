@@ -14,7 +14,7 @@ use afterlight_stages::{
     lights::step::{self, StepParams},
     surfaces::shade,
     surfaces::{
-        samples::{self, emission_tag},
+        samples::{self, PositionParams, emission_tag},
         shade::SurfaceSource,
     },
 };
@@ -49,6 +49,11 @@ static INFO: Info = Info {
         rates_decoupled: "n, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
+    approximations: &[samples::AT_SAMPLES],
+    departures: &[
+        "surfaces are lit at the pixel's centre, as forward shading does; the paper's place is position=sample",
+        "light is accumulated in registers and averaged at once: the paper has a multisampled accumulation buffer and a composition pass",
+    ],
     needs: &[samples::STANDARD_LOCATIONS],
     samples: MULTIPLE_SAMPLES,
     views: shade::VIEWS,
@@ -65,7 +70,7 @@ impl Technique for DeferredSsaa {
     }
 
     fn params(&self) -> Params {
-        Params::of(StepParams::default())
+        Params::of(StepParams::default()).and(Params::of(PositionParams::default()))
     }
 
     fn predict(&self, workload: &Workload, _: &Params) -> Cost {
@@ -81,9 +86,11 @@ impl Technique for DeferredSsaa {
             shading_tag: emission_tag(frame),
             samples: frame.samples,
         };
+        let at_samples = frame.params.typed::<PositionParams>().at_samples();
         let radiance =
             shade::shade(graph, frame, (INFO.id, lights), source, &filled.surfaces(frame), &|pass| {
-                filled.bind(pass)
+                filled.bind(pass);
+                pass.constant("AT_SAMPLES", at_samples);
             })?;
         frame.board.put(OpaqueDepth(filled.depth));
         Ok(radiance)

@@ -43,6 +43,9 @@ static INFO: Info = Info {
         rates_decoupled: "n, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
+    departures: &[
+        "no composition pass: lights are added with the albedo applied, so that the sum of a pixel is its radiance; the paper adds light alone and applies the albedo last",
+    ],
     ..Info::USUAL
 };
 

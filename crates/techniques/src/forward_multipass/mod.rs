@@ -47,6 +47,7 @@ static INFO: Info = Info {
         rates_decoupled: "n, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
+    departures: &["one sample a pixel alone, where the hardware could average several"],
     ..Info::USUAL
 };
 

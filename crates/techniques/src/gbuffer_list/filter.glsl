@@ -18,6 +18,7 @@ layout(constant_id = 18) const float REGION_RIGHT = 1.0;
 layout(constant_id = 19) const float REGION_BOTTOM = 1.0;
 layout(constant_id = 20) const float DEPTH_THRESHOLD_M = 0.0;
 layout(constant_id = 21) const float EDGE_THRESHOLD = 0.0;  // see depth_edge and surfaces_differ
+layout(constant_id = 24) const uint DEPTH_RANGE = 0u;       // depth edges by the range of depths; else by a share of a distance
 
 #ifndef SAMPLES_IN_KEYS
 layout(set = 0, binding = 9) uniform SAMPLED_IMAGE gbuffer_depth;
@@ -40,13 +41,17 @@ bool filtered_by_region(ivec2 pixel) {
     return (FILTERS & FILTER_RECTANGLE) != 0u && inside != (SMOOTH_INSIDE != 0u);
 }
 
-// Section 5.4: least and greatest view distance of the samples differ by more than a share of the least.
+// Section 5.4: least and greatest depth of the samples, of which the background is one, differ by more than a threshold. A departure is to
+// measure it as a share of the least view distance, so that edges far away are told as those nearby are.
 bool depth_edge(ivec2 pixel) {
     float near = 0.0, far = 1.0;    // depth is reversed
     for (uint i = 0u; i < SAMPLES; ++i) {
         float depth = SAMPLE_DEPTH(pixel, i);
         near = max(near, depth);
         far = min(far, depth);
+    }
+    if (DEPTH_RANGE != 0u) {
+        return near - far > EDGE_THRESHOLD;
     }
     if (far <= 0.0) {
         return near > 0.0;

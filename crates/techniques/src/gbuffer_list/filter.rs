@@ -4,7 +4,7 @@ use afterlight_graph::ConstantBits as _;
 
 use afterlight_frame::scene::SceneGpu;
 
-use super::params::{FilterParams, Region};
+use super::params::{DepthEdges, FilterParams, Region};
 
 /// Specialization constants of `filter.glsl`.
 pub(super) fn constants(params: &FilterParams) -> Vec<(String, u32)> {
@@ -18,6 +18,7 @@ pub(super) fn constants(params: &FilterParams) -> Vec<(String, u32)> {
         ("REGION_BOTTOM", share(params.bottom)),
         ("DEPTH_THRESHOLD_M", params.depth_threshold_m.bits()),
         ("EDGE_THRESHOLD", params.edge_threshold.bits()),
+        ("DEPTH_RANGE", u32::from(params.depth_edges == DepthEdges::Range)),
     ]
     .map(|(name, value)| (name.to_owned(), value))
     .to_vec()

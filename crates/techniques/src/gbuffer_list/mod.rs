@@ -5,7 +5,7 @@
 mod filter;
 mod params;
 
-pub use params::{Fill, Filter, FilterParams, GbufferListParams, Pointer, Position, Region};
+pub use params::{DepthEdges, Fill, Filter, FilterParams, GbufferListParams, Pointer, Position, Region};
 
 pub mod cost;
 
@@ -13,7 +13,7 @@ use afterlight_graph::{BufferHandle, BufferRole, DepthTest, Graph, ImageHandle, 
 
 use afterlight_cost::{Cost, Workload};
 use afterlight_frame::{
-    ANY_SAMPLES, Answers, AppendixA, Exactness, Frame, Info, OpaqueDepth, Params, Source, Technique,
+    ANY_SAMPLES, Answers, AppendixA, Approximation, Condition, Exactness, Frame, Info, OpaqueDepth, Params, Source, Technique,
     TechniqueError, params::Words, set_constants,
 };
 use afterlight_shader::Shader;
@@ -52,6 +52,17 @@ static INFO: Info = Info {
     },
     // Texture gradients are analytic where compute fills.
     exactness: Exactness::Exact { min_psnr_db: 45.0 },
+    approximations: &[Approximation {
+        when: &[Condition::SeveralSamples, Condition::Param("position", "depth")],
+        bound: "light that changes within a pixel differs, where forward takes it at the pixel's centre",
+        min_psnr_db: 25.0,
+    }],
+    departures: &[
+        "lists are filled in compute; the paper's second raster pass is fill=raster",
+        "blocks hold the view distance at the pixel's centre; the paper's depth at a sample is position=depth",
+        "surfaces visit the lights of their cluster where there are more than 16; the paper's loop over all is lights=all",
+        "the filter depth-edges takes distances over the nearest; the paper's range of depths is depth-edges=range",
+    ],
     needs: &[samples::STANDARD_LOCATIONS],
     samples: ANY_SAMPLES,
     tessellation: false,

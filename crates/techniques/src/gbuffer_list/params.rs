@@ -69,6 +69,16 @@ choices! {
     }
 }
 
+choices! {
+    /// What the filter `depth-edges` compares to its threshold.
+    pub enum DepthEdges {
+        /// The range of the samples' view distances over the nearest.
+        Relative = "relative",
+        /// The range of the samples' depths (Fridvalszky and Tóth 2020, section 5.4).
+        Range = "range",
+    }
+}
+
 parameters! {
     /// Which pixels and surfaces keep one sample alone.
     pub struct FilterParams {
@@ -88,7 +98,9 @@ parameters! {
         depth_threshold_m: f32 = 20.0, "depth-threshold", 0.0..=1e9;
         /// nodes or materials that the filter `objects` flags: a name, * for any characters
         objects: String = String::new(), "objects";
-        /// depth-edges: share of the nearest sample's distance; edges: one less the cosine between normals
+        /// what depth-edges compares to its threshold: the range of the samples' distances over the nearest, or the range of their depths, from 0 to 1 (the paper's)
+        depth_edges: DepthEdges = DepthEdges::Relative, "depth-edges";
+        /// depth-edges: share of the nearest sample's distance, or difference of depths; edges: one less the cosine between normals
         edge_threshold: f32 = 0.02, "edge-threshold", 0.0..=2.0;
     }
 }

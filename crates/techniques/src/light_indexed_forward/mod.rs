@@ -45,6 +45,7 @@ static INFO: Info = Info {
         rates_decoupled: "n, n",
     },
     exactness: indices::EXACTNESS,
+    departures: &["one sample a pixel alone, where the hardware could average several: a pixel has one list of lights"],
     ..Info::USUAL
 };
 

@@ -3,17 +3,21 @@
 // ORDER: 55
 
 pub mod cost;
+mod params;
+
+pub use params::{EdgeLight, LightPrepassParams};
 
 use afterlight_graph::{BufferRole, DepthTest, Graph, ImageHandle, Load, PassRole, gpu::vk};
 
 use afterlight_cost::{Cost, Workload};
 use afterlight_frame::{
-    Answers, AppendixA, Exactness, Frame, Info, OpaqueDepth, Params, Source, Technique, TechniqueError,
+    ANY_SAMPLES, Answers, AppendixA, Approximation, Condition, Exactness, Frame, Info, OpaqueDepth, Params,
+    Source, Technique, TechniqueError,
 };
 use afterlight_shader::Shader;
 use afterlight_stages::{
     lights::volumes,
-    surfaces::{depth_first::FIRST_FRAGMENT, geometry::SceneDraws},
+    surfaces::{RadianceTarget, depth_first::FIRST_FRAGMENT, geometry::SceneDraws},
 };
 
 /// The technique.
@@ -31,7 +35,7 @@ static INFO: Info = Info {
         surface: "depth, normal, roughness",
         lights: "light volumes",
         schedule: "fragment shader",
-        resolve: "one sample",
+        resolve: "average of the hardware's samples; light is gathered once a pixel",
     },
     appendix_a: AppendixA {
         id: "LPP",
@@ -43,6 +47,24 @@ static INFO: Info = Info {
         rates_decoupled: "n, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 50.0 },
+    approximations: &[
+        Approximation {
+            when: &[Condition::SeveralSamples, Condition::Param("edge-light", "pixel")],
+            bound: "surfaces at an edge are lit by the light of the surface at the pixel's centre",
+            min_psnr_db: 20.0,
+        },
+        Approximation {
+            when: &[Condition::SeveralSamples],
+            bound: "surfaces at an edge are lit by the light of the most similar surface at the centre of a pixel around",
+            min_psnr_db: 25.0,
+        },
+    ],
+    departures: &[
+        "three sums of light in colour in the place of one, and roughness beside the normal: exact for every material",
+        "at several samples surfaces at an edge take the light of the most similar pixel around; the paper's pixel is edge-light=pixel",
+        "at several samples the last pass has a depth buffer of its own: the first pass keeps one sample a pixel",
+    ],
+    samples: ANY_SAMPLES,
     ..Info::USUAL
 };
 
@@ -52,7 +74,7 @@ struct LobeBuffer {
     normal: ImageHandle,
     /// R8, 0 where no light is taken.
     roughness: ImageHandle,
-    /// Reversed, with stencil for [`apply_materials`].
+    /// Reversed; at one sample with stencil for [`apply_materials`].
     depth: ImageHandle,
 }
 
@@ -68,6 +90,10 @@ impl Technique for LightPrepass {
         &crate::SHADERS
     }
 
+    fn params(&self) -> Params {
+        Params::of(LightPrepassParams::default())
+    }
+
     fn predict(&self, workload: &Workload, _: &Params) -> Cost {
         cost::light_prepass(workload)
     }
@@ -76,7 +102,10 @@ impl Technique for LightPrepass {
         let filled = fill(graph, frame)?;
         let surfaces = [&filled.depth, &filled.normal, &filled.roughness];
         let sums = gather_lights(graph, frame, INFO.id, surfaces)?;
-        apply_materials(graph, frame, filled.depth, &sums)
+        match frame.samples {
+            1 => apply_materials(graph, frame, filled.depth, &sums),
+            _ => apply_materials_to_samples(graph, frame, &filled, &sums),
+        }
     }
 }
 
@@ -86,11 +115,9 @@ fn fill(graph: &mut Graph, frame: &Frame<'_>) -> Result<LobeBuffer, TechniqueErr
         graph.image("light-prepass/normal", BufferRole::Surfaces, frame.image_info(vk::Format::R16G16_UNORM));
     let roughness =
         graph.image("light-prepass/roughness", BufferRole::Surfaces, frame.image_info(vk::Format::R8_UNORM));
-    let depth = graph.image(
-        "light-prepass/depth",
-        BufferRole::Depth,
-        frame.image_info(vk::Format::D32_SFLOAT_S8_UINT),
-    );
+    let has_stencil = frame.samples == 1;
+    let format = if has_stencil { vk::Format::D32_SFLOAT_S8_UINT } else { vk::Format::D32_SFLOAT };
+    let depth = graph.image("light-prepass/depth", BufferRole::Depth, frame.image_info(format));
     let surfaces = SceneDraws::shaded(frame, "light_prepass/lobe.frag", "light_prepass/lobe.frag#mask")?;
     let mut pass = graph.raster("light-prepass/gbuffer", PassRole::Geometry);
     frame.bind_scene(&mut pass);
@@ -100,7 +127,9 @@ fn fill(graph: &mut Graph, frame: &Frame<'_>) -> Result<LobeBuffer, TechniqueErr
         roughness: pass.color(roughness, Load::DontCare),
         depth: pass.depth(depth, Load::Clear(0.0)),
     };
-    pass.stencil_clear(0);
+    if has_stencil {
+        pass.stencil_clear(0);
+    }
     surfaces.draw(frame, &mut pass);
     pass.finish();
     Ok(filled)
@@ -153,6 +182,48 @@ fn apply_materials(
     }
     let radiance = pass.color(radiance, Load::Clear(frame.background()));
     let depth = pass.stencil(depth, Load::Keep);
+    surfaces.draw(frame, &mut pass);
+    pass.finish();
+    frame.board.put(OpaqueDepth(depth));
+    Ok(radiance)
+}
+
+/// Third pass at several samples a pixel: all surfaces again into buffers of their own, whose samples the hardware averages. A
+/// fragment takes the sums of a pixel by [`EdgeLight`].
+fn apply_materials_to_samples(
+    graph: &mut Graph,
+    frame: &Frame<'_>,
+    filled: &LobeBuffer,
+    sums: &[ImageHandle; 3],
+) -> Result<ImageHandle, TechniqueError> {
+    let target = RadianceTarget::new(graph, frame, INFO.id);
+    let depth = graph.image(
+        "light-prepass/sample depth",
+        BufferRole::Depth,
+        frame.multisampled_info(vk::Format::D32_SFLOAT),
+    );
+    let alike = frame.params.typed::<LightPrepassParams>().edge_light == EdgeLight::Alike;
+    let surfaces = match alike {
+        true => SceneDraws::shaded(
+            frame,
+            "light_prepass/material.frag#alike",
+            "light_prepass/material.frag#alike-mask",
+        )?,
+        false => {
+            SceneDraws::shaded(frame, "light_prepass/material.frag", "light_prepass/material.frag#mask")?
+        }
+    };
+    let mut pass = graph.raster("light-prepass/materials", PassRole::Shading);
+    frame.bind_scene(&mut pass);
+    for (slot, sum) in SUMS.iter().zip(sums) {
+        pass.read(slot, sum);
+    }
+    if alike {
+        pass.read("surface_depth", &filled.depth);
+        pass.read("surface_normal", &filled.normal);
+    }
+    let radiance = target.attach(frame, &mut pass);
+    let depth = pass.depth(depth, Load::Clear(0.0));
     surfaces.draw(frame, &mut pass);
     pass.finish();
     frame.board.put(OpaqueDepth(depth));

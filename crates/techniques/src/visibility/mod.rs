@@ -50,6 +50,11 @@ static INFO: Info = Info {
         rates_decoupled: "y, n",
     },
     exactness: Exactness::Exact { min_psnr_db: 45.0 },
+    departures: &[
+        "one sample a pixel alone, where the paper has several: those come with decoupled shading, which dais and gbuffer-list do",
+        "no list of tiles sorted by shader, as all materials share one",
+        "a thread a pixel interpolates its triangle: the paper transforms and rasterises the triangles of a tile again in compute",
+    ],
     tessellation: false,
     ..Info::USUAL
 };

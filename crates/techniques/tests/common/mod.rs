@@ -11,7 +11,7 @@ use std::{
 use afterlight_image::{Rgba8Image, psnr_db};
 use afterlight_renderer::{Prepared, Renderer};
 use afterlight_techniques::{
-    Params, SceneGpu, Settings, Technique, TechniqueError,
+    Exactness, Params, SceneGpu, Settings, Technique, TechniqueError, exactness_of,
     graph::gpu,
     params_of,
     scene::{self, Camera, Light, LightKind, Scene, lights::seeded_lights},
@@ -142,6 +142,48 @@ pub fn image_of(prepared: &mut Prepared) -> Rgba8Image {
     prepared.run().unwrap_or_else(|e| panic!("{e}"));
     let (width, height) = prepared.size_px();
     Rgba8Image { width, height, pixels: prepared.final_rgba8().unwrap_or_else(|e| panic!("{e}")) }
+}
+
+/// Least PSNR to `forward` of an exact technique at several samples, dB (contract).
+const MULTISAMPLED_MIN_DB: f64 = 40.0;
+
+/// Least PSNR to `forward` that a technique promises with these parameters at so many samples a pixel, dB.
+pub fn least_db(technique: &dyn Technique, params: &Params, samples: u32) -> f64 {
+    match exactness_of(technique, params, samples) {
+        Exactness::Exact { .. } if samples > 1 => MULTISAMPLED_MIN_DB,
+        Exactness::Exact { min_psnr_db } | Exactness::Approximate { min_psnr_db, .. } => min_psnr_db,
+    }
+}
+
+/// Numbers from 0 to 1 (Steele, Lea and Flood 2014, SplitMix64).
+pub struct Random(pub u64);
+
+impl Random {
+    /// From 0 to 1.
+    pub fn unit(&mut self) -> f32 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut bits = self.0;
+        bits = (bits ^ bits >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        bits = (bits ^ bits >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((bits ^ bits >> 31) >> 40) as f32 / (1u64 << 24) as f32
+    }
+
+    /// Three of them.
+    pub fn vector(&mut self) -> Vec3 {
+        Vec3::new(self.unit(), self.unit(), self.unit())
+    }
+}
+
+/// A camera in the scene's bounds or just above their floor, of 20 to 120 degrees.
+pub fn random_camera(stage: &Stage, random: &mut Random) -> Camera {
+    let bounds = stage.scene.bounds_ws();
+    let mut eye = bounds.min + bounds.size() * random.vector();
+    if random.unit() < 0.4 {
+        eye.y = bounds.min.y + 0.02 * bounds.size().y;
+    }
+    let target = bounds.min + bounds.size() * random.vector();
+    let fov_y_rad = (20.0 + 100.0 * random.unit()).to_radians();
+    Camera::look_at("random", eye, target, fov_y_rad, 0.01)
 }
 
 /// PSNR in dB, infinite where equal.

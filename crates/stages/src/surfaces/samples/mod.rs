@@ -1,9 +1,13 @@
 //! Multisampled G-buffers: attributes of the surface that every sample shows.
 //!
-//! [`fill_samples`] fills 16 bytes a sample, depth included: base colour and metalness, normal, roughness, occlusion, an edge mark
-//! (Fridvalszky and Tóth 2020, section 3). [`fill`] fills any other layout. Scenes with emissive surfaces take four bytes more.
+//! [`fill_samples`] fills 16 bytes a sample, depth included: base colour and metalness, normal, roughness, occlusion, an edge mark, the depth at
+//! the pixel's centre (Fridvalszky and Tóth 2020, section 3). [`fill`] fills any other layout. Scenes with emissive surfaces take four bytes more.
 
-use afterlight_frame::{Frame, Need, Slots, TechniqueError};
+mod params;
+
+pub use params::{EdgeParams, Edges, Position, PositionParams};
+
+use afterlight_frame::{Approximation, Condition, Frame, Need, Slots, TechniqueError};
 use afterlight_graph::{BufferHandle, BufferRole, Graph, ImageHandle, Load, PassRole, gpu::vk};
 
 use crate::{lights::cells, surfaces::geometry::SceneDraws};
@@ -11,6 +15,13 @@ use crate::{lights::cells, surfaces::geometry::SceneDraws};
 /// Positions are reconstructed where the samples stand.
 pub const STANDARD_LOCATIONS: Need =
     Need { name: "standard sample locations", test: |features| features.standard_sample_locations };
+
+/// What lighting surfaces at their samples comes to, for [`afterlight_frame::Info::approximations`] of techniques with [`PositionParams`].
+pub const AT_SAMPLES: Approximation = Approximation {
+    when: &[Condition::Param("position", "sample")],
+    bound: "light that changes within a pixel is averaged, where forward takes it at the pixel's centre",
+    min_psnr_db: 25.0,
+};
 
 /// A multisampled G-buffer: the depth, and other images with the names of their slots.
 pub struct SampleBuffer {

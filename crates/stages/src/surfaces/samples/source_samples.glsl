@@ -1,11 +1,13 @@
 // Surfaces of a pixel from the multisampled G-buffer that samples.frag.glsl fills.
 //
 // EVERY_SAMPLE: all samples. Otherwise all samples where a triangle's edge crosses the pixel, else the first alone; PIXEL_RATE and
-// SAMPLE_RATE say beforehand which of the two it is.
+// SAMPLE_RATE say beforehand which of the two it is. Surfaces are lit at the pixel's centre, as in forward shading; with AT_SAMPLES at their
+// samples where each is shaded.
 #include "surfaces/samples/edge_mark.glsl"
 
 layout(set = 0, binding = 9) uniform texture2DMS gbuffer_base_color;
 layout(set = 0, binding = 10) uniform texture2DMS gbuffer_normal;
+layout(constant_id = 11) const uint AT_SAMPLES = 0u;
 #ifdef EMISSION
 layout(set = 0, binding = 12) uniform texture2DMS gbuffer_emission;
 #endif
@@ -31,16 +33,6 @@ void source_begin(ivec2 pixel) {
     source_weight = sample_rate ? 1u : SAMPLES;
 }
 
-// Depth at the centre of a pixel that one triangle covers: depth is affine on the screen, and the mean of the standard
-// locations is the centre.
-float center_depth(ivec2 pixel) {
-    float sum = 0.0;
-    for (uint i = 0u; i < SAMPLES; ++i) {
-        sum += texelFetch(gbuffer_depth, pixel, int(i)).r;
-    }
-    return sum / float(SAMPLES);
-}
-
 bool source_next(out Surface s, out uint weight) {
     float depth = 0.0;
     uint i = 0u;
@@ -53,9 +45,11 @@ bool source_next(out Surface s, out uint weight) {
         return false;
     }
     vec4 base = texelFetch(gbuffer_base_color, source_pixel, int(i));
-    vec2 roughness_occlusion = texelFetch(gbuffer_roughness, source_pixel, int(i)).rg;
-    bool at_center = source_weight == SAMPLES;
-    s.position_ws = at_center ? position_from_depth(ndc_from_pixel(uvec2(source_pixel)), center_depth(source_pixel))
+    uint word = sample_word_at(source_pixel, i);
+    vec2 roughness_occlusion = unpackUnorm4x8(word).rg;
+    bool at_center = AT_SAMPLES == 0u || source_weight == SAMPLES;
+    s.position_ws = at_center ? position_from_depth(ndc_from_pixel(uvec2(source_pixel)),
+                                                    unpack_center_depth(sample_center_bits(word), depth))
                               : position_from_depth(ndc_from_sample(source_pixel, i), depth);
     s.normal_ws = octahedral_decode(texelFetch(gbuffer_normal, source_pixel, int(i)).rg * 2.0 - 1.0);
     s.base_color = base.rgb;
