@@ -13,6 +13,7 @@ pub mod lights;
 mod load;
 mod model;
 mod obj;
+pub mod points;
 pub mod rng;
 mod tangent;
 pub mod texture;
