@@ -39,7 +39,7 @@ pub struct Verification {
     pub off: Vec<Finding>,
     /// How many are off in all.
     pub off_count: u64,
-    /// The comparisons that are least within their bounds, the worst first.
+    /// The images that are least within their bounds, the worst first; none that is equal to the reference's.
     pub nearest: Vec<Finding>,
 }
 

@@ -146,7 +146,7 @@ fn tell(text: &mut String, finding: &Finding) {
     let what = match (&finding.reason, &finding.difference) {
         (Some(reason), _) => reason.clone(),
         (None, Some(difference)) => {
-            format!("{} dB above {:.0}", margin_text(difference.psnr_db - finding.bound_db), finding.bound_db)
+            format!("{:.1} dB, at least {:.0} expected", difference.psnr_db, finding.bound_db)
         }
         (None, None) => String::new(),
     };

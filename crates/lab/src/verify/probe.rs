@@ -83,3 +83,67 @@ fn text(seen: Seen) -> String {
         Seen::Surface([near_m, far_m]) => format!("a surface at {near_m:.6} to {far_m:.6} m"),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use afterlight_oracle::raster::pixel_ray;
+    use afterlight_scene::Scene;
+
+    use super::*;
+
+    const SIZE_PX: [u32; 2] = [48, 32];
+    /// Near plane of the scene's camera, m.
+    const NEAR_M: f64 = 0.1;
+
+    /// What a device without rounding would draw.
+    fn ideal(rays: &RayScene<'_>, settings: &Settings) -> (Vec<f32>, Vec<f32>) {
+        let (mut depth, mut radiance) = (Vec::new(), Vec::new());
+        for pixel in (0..SIZE_PX[0] * SIZE_PX[1]).map(|i| [i % SIZE_PX[0], i / SIZE_PX[0]]) {
+            let hit = rays.first_hit(&pixel_ray(&settings.camera, pixel, SIZE_PX));
+            depth.push(hit.map_or(0.0, |hit| (NEAR_M / hit.distance_m) as f32));
+            let shaded = rays.shade_pixel(&settings.lights, &settings.camera, pixel, SIZE_PX);
+            radiance.extend(shaded.extend(1.0).as_vec4().to_array());
+        }
+        (depth, radiance)
+    }
+
+    fn scene() -> Scene {
+        afterlight_scene::builtin::build("builtin:intersect").expect("is there")
+    }
+
+    /// Judges all that is drawn after a change of it; the number of pixels that are off, and of those that were shaded.
+    fn off(change: impl Fn(&mut Vec<f32>, &mut Vec<f32>)) -> (u64, u64) {
+        let scene = scene();
+        let rays = RayScene::new(&scene);
+        let settings = Settings::for_scene(&scene, SIZE_PX[0], SIZE_PX[1]);
+        let (mut depth, mut radiance) = ideal(&rays, &settings);
+        change(&mut depth, &mut radiance);
+        let depth_to_distance = [0.0, NEAR_M as f32, 1.0, 0.0];
+        let drawn = Drawn { settings: &settings, depth: &depth, depth_to_distance, radiance: &radiance };
+        let judged = judge(&rays, &drawn, 2_000, &mut SplitMix64::new(3));
+        assert_eq!(judged.probes.off, judged.off.len() as u64);
+        assert_eq!(judged.probes.surfaces + judged.probes.unjudged, 2_000);
+        (judged.probes.off, judged.probes.radiances)
+    }
+
+    #[test]
+    fn what_rays_show_is_accepted() {
+        let (off, shaded) = off(|_, _| {});
+        assert_eq!(off, 0);
+        assert!(shaded > 100, "{shaded} shaded");
+    }
+
+    #[test]
+    fn what_is_wrong_is_off() {
+        let (nearer, _) = off(|depth, _| depth.iter_mut().for_each(|z| *z *= 1.01));
+        let (hole, _) = off(|depth, _| depth.iter_mut().for_each(|z| *z = 0.0));
+        let (shifted, _) = off(|depth, _| depth.rotate_right(1));
+        let (filled, _) = off(|depth, _| depth.iter_mut().for_each(|z| *z = z.max(0.02)));
+        let (_, shaded) = off(|_, _| {});
+        let (brighter, _) = off(|_, radiance| radiance.iter_mut().for_each(|c| *c = *c * 1.01 + 0.001));
+        for (what, off) in [("nearer", nearer), ("hole", hole), ("shifted", shifted), ("filled", filled)] {
+            assert!(off > 200, "{what}: {off} of 2000 off");
+        }
+        assert!(2 * brighter > shaded, "brighter: {brighter} of {shaded} off");
+    }
+}

@@ -287,8 +287,7 @@ pub(super) fn floor(width_m: u32) -> Scene {
     b.scene.environment =
         Environment { ambient_radiance: Vec3::splat(0.1), background_radiance: Vec3::new(0.05, 0.06, 0.08) };
     let (eye_ws, target_ws) = (Vec3::new(0.0, 1.7, 0.0), Vec3::new(3.0, 1.2, -4.0));
-    // The ratio of extent to near plane of a camera that is made to fit a scene, 40 m to 4 mm.
-    let near_m = (1e-4 * width_m as f32).min(0.1);
+    let near_m = crate::camera::near_of_extent_m(width_m as f32);
     b.scene.cameras = vec![Camera::look_at("standing", eye_ws, target_ws, 60f32.to_radians(), near_m)];
     b.scene
 }
