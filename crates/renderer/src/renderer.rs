@@ -371,6 +371,15 @@ fn check_size(device: &gpu::Device, settings: &Settings) -> Result<(), Technique
     Ok(())
 }
 
+/// Depth as the device has stored it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StoredDepth {
+    /// One a pixel, rows from the top; reversed, 0 where there is no surface.
+    pub values: Vec<f32>,
+    /// `[a, b, c, d]`: a depth z is at the view distance `(a z + b) / (c z + d)`, metres.
+    pub to_distance: [f32; 4],
+}
+
 /// A technique ready to run, as often as wanted.
 pub struct Prepared {
     executor: Executor,
@@ -435,23 +444,18 @@ impl Prepared {
         Ok(self.hdr.map(|hdr| self.executor.read_image(hdr)).transpose()?)
     }
 
-    /// Depth of the last frame's opaque surfaces as the device stores it, reversed, 0 where there is none, rows from the top, and
-    /// `[a, b, c, d]` by which a depth z becomes the view distance `(a z + b) / (c z + d)` in metres. `None` unless
-    /// [`Settings::keep_depth`] was set and the technique has drawn 32-bit depth at one sample.
+    /// Depth of the last frame's opaque surfaces. `None` unless [`Settings::keep_depth`] was set and the technique has drawn 32-bit depth at one
+    /// sample, in the size of the frame.
     ///
     /// # Errors
     /// The device.
-    pub fn depth(&mut self) -> Result<Option<(Vec<f32>, [f32; 4])>, TechniqueError> {
+    pub fn depth(&mut self) -> Result<Option<StoredDepth>, TechniqueError> {
         let Some((depth, to_distance)) = self.depth else { return Ok(None) };
         let bytes = self.executor.read_image(depth)?;
+        let values: Vec<f32> =
+            bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
         let pixels = self.width_px as usize * self.height_px as usize;
-        if bytes.len() != 4 * pixels {
-            return Ok(None);
-        }
-        Ok(Some((
-            bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect(),
-            to_distance,
-        )))
+        Ok((bytes.len() == 4 * pixels).then_some(StoredDepth { values, to_distance }))
     }
 
     /// What the last frame counted of everything that can overflow: what it needed, what there was, what was dropped.

@@ -126,7 +126,7 @@ pub fn verify(
         techniques.iter().position(|one| Some(one.id()) == id)
     };
     margins.sort_by_key(order);
-    off.sort_by(|a, b| worst_first(a, b));
+    off.sort_by(worst_first);
     off.truncate(spec.worst);
     let left_out = left_out.into_iter();
     Ok(Verification {
@@ -297,14 +297,13 @@ impl Check<'_> {
         plain.effects.indirect.method = Indirect::None;
         let mut prepared = self.renderer(&plain)?.prepare(reference.technique, &reference.params)?;
         prepared.run()?;
-        let (Some((depth, depth_to_distance)), Some(radiance)) = (prepared.depth()?, prepared.hdr_rgba()?)
-        else {
+        let (Some(depth), Some(radiance)) = (prepared.depth()?, prepared.hdr_rgba()?) else {
             return Err(LabError::BrokeOff {
                 what: REFERENCE.to_owned(),
                 reason: "found no depth, expected what it puts on the board".to_owned(),
             });
         };
-        let drawn = probe::Drawn { settings: &plain, depth: &depth, depth_to_distance, radiance: &radiance };
+        let drawn = probe::Drawn { settings: &plain, depth: &depth, radiance: &radiance };
         let mut rng = SplitMix64::new(!view::generator(self.spec.seed, view.index).next_u64());
         let judged = probe::judge(rays, &drawn, self.spec.probes, &mut rng);
         let probes = &mut self.found.probes;

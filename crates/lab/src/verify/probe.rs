@@ -5,6 +5,7 @@ use afterlight_oracle::{
     raster::RayScene,
     sight::{Judge, Seen},
 };
+use afterlight_renderer::StoredDepth;
 use afterlight_scene::rng::SplitMix64;
 use afterlight_techniques::Settings;
 use glam::DVec3;
@@ -22,10 +23,8 @@ const DIM: f64 = 0.05;
 pub struct Drawn<'a> {
     /// Its settings.
     pub settings: &'a Settings,
-    /// Depth of opaque surfaces, and how it becomes a view distance.
-    pub depth: &'a [f32],
-    /// See [`afterlight_renderer::Prepared::depth`].
-    pub depth_to_distance: [f32; 4],
+    /// Depth of opaque surfaces.
+    pub depth: &'a StoredDepth,
     /// Linear radiance, RGBA.
     pub radiance: &'a [f32],
 }
@@ -53,7 +52,7 @@ pub fn judge(rays: &RayScene<'_>, drawn: &Drawn<'_>, count: u32, rng: &mut Split
             continue;
         };
         judged.probes.surfaces += 1;
-        let seen = Seen::of_depth(drawn.depth[place], drawn.depth_to_distance);
+        let seen = Seen::of_depth(drawn.depth.values[place], drawn.depth.to_distance);
         if !sight.accepts(seen) {
             let reason = format!("found {}, expected {}", text(seen), sight.text());
             judged.off.push((pixel, reason));
@@ -67,7 +66,7 @@ pub fn judge(rays: &RayScene<'_>, drawn: &Drawn<'_>, count: u32, rng: &mut Split
         let found = DVec3::from_array([0, 1, 2].map(|c| f64::from(drawn.radiance[4 * place + c])));
         let off = (least - found).max(found - most).max_element() / (most.max_element() + DIM);
         // 16-bit floats end at 65,504.
-        if !(off <= RADIANCE_OFF) && most.max_element() < 6e4 {
+        if (off > RADIANCE_OFF || !found.is_finite()) && most.max_element() < 6e4 {
             let reason =
                 format!("found radiance {found:.5}, expected {least:.5} to {most:.5}: off by {off:.4}");
             judged.off.push((pixel, reason));
@@ -118,8 +117,8 @@ mod tests {
         let settings = Settings::for_scene(&scene, SIZE_PX[0], SIZE_PX[1]);
         let (mut depth, mut radiance) = ideal(&rays, &settings);
         change(&mut depth, &mut radiance);
-        let depth_to_distance = [0.0, NEAR_M as f32, 1.0, 0.0];
-        let drawn = Drawn { settings: &settings, depth: &depth, depth_to_distance, radiance: &radiance };
+        let depth = StoredDepth { values: depth, to_distance: [0.0, NEAR_M as f32, 1.0, 0.0] };
+        let drawn = Drawn { settings: &settings, depth: &depth, radiance: &radiance };
         let judged = judge(&rays, &drawn, 2_000, &mut SplitMix64::new(3));
         assert_eq!(judged.probes.off, judged.off.len() as u64);
         assert_eq!(judged.probes.surfaces + judged.probes.unjudged, 2_000);
