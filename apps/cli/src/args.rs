@@ -34,6 +34,8 @@ pub enum Command {
     Render(RenderArgs),
     /// Run techniques on the same view and compare times, memory and images
     Compare(CompareArgs),
+    /// Check techniques from random views, and the reference against rays in f64
+    Verify(VerifyArgs),
     /// Run experiments
     Bench(BenchArgs),
     /// Print shell completions
@@ -132,6 +134,67 @@ pub struct CompareArgs {
     pub json: JsonArgs,
     #[command(flatten)]
     pub common: CommonArgs,
+}
+
+/// Arguments of `verify`. What is not given is drawn at random for each view.
+#[derive(Debug, Args)]
+pub struct VerifyArgs {
+    /// A .gltf, .glb or .obj file, or builtin:NAME[?key=value&…]
+    #[arg(default_value = DEFAULT_SCENE)]
+    pub scene: String,
+    /// Number of views
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    pub views: u64,
+    /// Seed of the views; the time of day where none is given, which the output tells
+    #[arg(long, value_name = "S")]
+    pub seed: Option<u64>,
+    /// Number of the first view: several programs may share the views of one seed
+    #[arg(long, value_name = "K", default_value_t = 0, value_parser = clap::value_parser!(u64).range(0..=1_000_000_000_000))]
+    pub first: u64,
+    /// Begin no further view after this time, seconds
+    #[arg(long, value_name = "SECONDS", value_parser = finite)]
+    pub seconds: Option<f64>,
+    /// Techniques, by their ids, or all
+    #[arg(long, value_name = "ID,ID…|all", value_delimiter = ',', default_value = "all")]
+    pub techniques: Vec<String>,
+    /// A technique's parameter, which is then not drawn; ID.KEY=VALUE for one technique alone
+    #[arg(long, value_name = "[ID.]KEY=VALUE")]
+    pub set: Vec<String>,
+    /// Image width, pixels [default: drawn, 64 to 640]
+    #[arg(long, value_name = "W", value_parser = clap::value_parser!(u32).range(1..))]
+    pub width: Option<u32>,
+    /// Image height, pixels [default: drawn, by the width]
+    #[arg(long, value_name = "H", value_parser = clap::value_parser!(u32).range(1..))]
+    pub height: Option<u32>,
+    /// Samples a pixel [default: drawn, of those up to 8 that the device has]
+    #[arg(long, value_name = "1|2|4|8|16", value_parser = samples)]
+    pub samples: Option<u32>,
+    /// Number of seeded point lights; 0 keeps the scene's own lights [default: drawn, up to 5,000]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(0..=i64::from(LIGHTS_MAX)))]
+    pub lights: Option<u32>,
+    /// Pixels of each view of the reference that rays in f64 judge
+    #[arg(long, value_name = "N", default_value_t = 256, value_parser = clap::value_parser!(u32).range(0..=1_000_000))]
+    pub probes: u32,
+    /// Most findings that are told
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub worst: u32,
+    /// Write a picture of each of the first findings into DIR: the reference, the image, and the pixels that differ
+    #[arg(long, value_name = "DIR")]
+    pub pictures: Option<PathBuf>,
+    /// Device, by a part of its name or its index (see `afterlight devices`)
+    #[arg(long, value_name = "NAME|INDEX")]
+    pub device: Option<String>,
+    /// Time at which animated nodes are posed, seconds
+    #[arg(long, value_name = "SECONDS", value_parser = finite)]
+    pub time: Option<f64>,
+    /// Turn on Vulkan validation; any message makes the exit code 3
+    #[arg(long)]
+    pub validate: bool,
+    /// No progress bars and no tables
+    #[arg(long)]
+    pub quiet: bool,
+    #[command(flatten)]
+    pub json: JsonArgs,
 }
 
 /// Options that a specification holds, so that they cannot stand beside `--spec`.
@@ -260,8 +323,9 @@ pub struct CommonArgs {
     /// Seed of the lights
     #[arg(long, value_name = "SEED", default_value_t = 1)]
     pub light_seed: u64,
-    /// Camera of the scene by name or index, or eye, target and vertical angle of view
-    #[arg(long, value_name = "NAME|INDEX|x,y,z,tx,ty,tz,fov_deg", allow_hyphen_values = true)]
+    /// Camera of the scene by name or index, or eye, target, vertical angle of view and near plane [default: 0.1]; or eye, target and
+    /// orthographic,HALF_HEIGHT,NEAR,FAR
+    #[arg(long, value_name = "NAME|INDEX|x,y,z,tx,ty,tz,fov_deg[,near_m]", allow_hyphen_values = true)]
     pub camera: Option<String>,
     /// A technique's parameter; ID.KEY=VALUE for one technique alone
     #[arg(long, value_name = "[ID.]KEY=VALUE")]

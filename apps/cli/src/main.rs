@@ -39,6 +39,7 @@ fn run(command: Command) -> Result<(), Failure> {
         Command::Scene(args) => commands::scene::run(&args),
         Command::Render(args) => commands::render::run(&args),
         Command::Compare(args) => commands::compare::run(&args),
+        Command::Verify(args) => commands::verify::run(&args),
         Command::Bench(args) => commands::bench::run(&args),
         Command::Completions(args) => commands::completions::run(&args),
     }

@@ -96,6 +96,12 @@ fn bad_usage_is_one_line_and_exit_code_2() {
         2,
         &["view", "normals", "final", "invocations"],
     );
+    refused(&["verify", "--views", "0"], 2, &["--views", "0"]);
+    refused(&["verify", "--samples", "3"], 2, &["--samples", "3", "1, 2, 4, 8 or 16"]);
+    refused(&["verify", "--techniques", "backward"], 2, &["--techniques", "backward", "forward"]);
+    refused(&["verify", "--techniques", "tiled", "--samples", "4"], 2, &["--samples", "4", "one of: 1"]);
+    refused(&["verify", "--set", "nokey=1"], 2, &["nokey", "cull"]);
+    refused(&["verify", "--json", "builtin:spheres"], 2, &["--json", "builtin:spheres"]);
     refused(&["bench", "everything"], 2, &["everything", "speed", "msaa-table1"]);
     refused(&["bench", "speed", "--scale", "0"], 2, &["--scale", "0", "at most 1"]);
     refused(&["completions", "csh"], 2, &["csh"]);
@@ -109,7 +115,9 @@ fn bad_usage_is_one_line_and_exit_code_2() {
 
 #[test]
 fn bad_scenes_are_one_line_and_exit_code_2() {
-    for command in [&["scene"][..], &["compare"], &["render", "--technique", "forward", "-o", "a.png"]] {
+    for command in
+        [&["scene"][..], &["compare"], &["verify"], &["render", "--technique", "forward", "-o", "a.png"]]
+    {
         let with = |scene| [command, &[scene]].concat();
         refused(&with("absent.gltf"), 2, &["absent.gltf"]);
         refused(&with("absent.txt"), 2, &["absent.txt", ".gltf"]);
@@ -789,4 +797,64 @@ fn every_invalid_sample_is_told_or_loads() {
             assert_eq!(error.to_string().lines().count(), 1, "{}: {error}", path.display());
         }
     }
+}
+
+/// Runs a command that the program has printed; its words are quoted for a shell by single quotes alone.
+fn run_printed(folder: &Path, command: &str, more: &[&str]) -> Output {
+    let words = command.strip_prefix("afterlight ").expect("is a command of the program");
+    let words: Vec<String> = words.split(' ').map(|word| word.trim_matches('\'').to_owned()).collect();
+    let words: Vec<&str> = words.iter().map(String::as_str).chain(more.iter().copied()).collect();
+    run_in(folder, &words)
+}
+
+/// The command of a finding draws the very view again: its image is as far from the reference's, to the last digit.
+#[test]
+fn verify_finds_nothing_and_its_commands_repeat_views() {
+    if !has_device() {
+        return;
+    }
+    let folder = folder();
+    let verify =
+        ["verify", "builtin:intersect", "--views", "3", "--seed", "7", "--width", "80", "--height", "45"];
+    let chosen = ["--techniques", "deferred,tiled,gbuffer-list", "--lights", "9", "--probes", "64", "--json"];
+    let output = run_in(folder.path(), &[&verify[..], &chosen].concat());
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    assert!(text(&output.stderr).contains("3 views of seed 7"), "{}", text(&output.stderr));
+    let found = json(&output);
+    assert_eq!((&found["views"], &found["off_count"], &found["seed"]), (&3.into(), &0.into(), &7.into()));
+    assert!(found["probes"]["surfaces"].as_u64() > Some(100), "{}", found["probes"]);
+    let nearest = found["nearest"].as_array().expect("is a list");
+    assert!(!nearest.is_empty());
+    for finding in nearest {
+        let command = finding["command"].as_str().expect("is a text");
+        let again = json(&run_printed(folder.path(), command, &["--json"]));
+        let difference = &again["results"][0]["difference"];
+        for key in ["psnr_db", "max_abs"] {
+            assert_eq!(difference[key], finding["difference"][key], "{command}");
+        }
+    }
+}
+
+#[test]
+fn verify_ends_with_1_where_a_technique_is_off() {
+    if !has_device() {
+        return;
+    }
+    let folder = folder();
+    let verify =
+        ["verify", "builtin:intersect", "--views", "4", "--seed", "1", "--width", "80", "--height", "45"];
+    let chosen = ["--techniques", "light-list", "--set", "light-nodes=4", "--lights", "40", "--samples", "1"];
+    let more = ["--pictures", "off", "--json"];
+    let output = run_in(folder.path(), &[&verify[..], &chosen, &more].concat());
+    assert_eq!(output.status.code(), Some(1), "{}", text(&output.stderr));
+    let last = text(&output.stderr).lines().last().expect("a line").to_owned();
+    assert!(last.starts_with("afterlight: ") && last.contains("light-list"), "{last}");
+    let found = json(&output);
+    let worst = &found["off"][0];
+    assert_eq!(worst["params"]["light-nodes"], "4");
+    let picture = folder.path().join(worst["picture"].as_str().expect("a picture was written"));
+    assert!(fs::read(picture).expect("is there").starts_with(b"\x89PNG"));
+    let command = worst["command"].as_str().expect("is a text");
+    let again = run_printed(folder.path(), command, &[]);
+    assert_eq!(again.status.code(), Some(1), "{command}: {}", text(&again.stderr));
 }

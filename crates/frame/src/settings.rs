@@ -24,6 +24,9 @@ pub struct Settings {
     pub view: String,
     /// Keeps the linear radiance after a frame, for `Prepared::hdr_rgba`; its memory is then not reused.
     pub keep_hdr: bool,
+    /// Keeps the depth of opaque surfaces after a frame of one sample, for `Prepared::depth`, where the technique puts it on the
+    /// board; its memory is then not reused.
+    pub keep_depth: bool,
     /// Effects.
     pub effects: Effects,
 }
@@ -41,6 +44,7 @@ impl Settings {
             environment: scene.environment,
             view: views::FINAL.to_owned(),
             keep_hdr: false,
+            keep_depth: false,
             effects: Effects::default(),
         }
     }

@@ -40,6 +40,21 @@ pub fn max_abs(reference: &Rgba8Image, test: &Rgba8Image) -> Result<u8, ImageErr
     Ok(differences(reference, test).max().unwrap_or(0))
 }
 
+/// Pixels of which a red, green or blue byte differs by `least` or more.
+///
+/// # Errors
+/// [`ImageError::SizeMismatch`].
+pub fn pixels_off(reference: &Rgba8Image, test: &Rgba8Image, least: u8) -> Result<u64, ImageError> {
+    check_sizes("pixels off", reference, test)?;
+    let pairs = reference.pixels.chunks_exact(4).zip(test.pixels.chunks_exact(4));
+    Ok(pairs.filter(|(a, b)| is_off(a, b, least)).count() as u64)
+}
+
+/// Whether a red, green or blue byte of two pixels differs by `least` or more.
+pub(crate) fn is_off(a: &[u8], b: &[u8], least: u8) -> bool {
+    (0..3).any(|c| a[c].abs_diff(b[c]) >= least)
+}
+
 /// A FLIP comparison.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Flip {

@@ -10,12 +10,12 @@ mod file;
 mod png_file;
 mod sheet;
 
-pub use compare::{Flip, flip, max_abs, psnr_db};
+pub use compare::{Flip, flip, max_abs, pixels_off, psnr_db};
 pub use error::ImageError;
 pub use exr_file::{read_exr, write_exr};
 pub use file::write_atomically;
 pub use png_file::{decode_png, encode_png, read_png, write_png};
-pub use sheet::{difference_sheet, heat_color, heat_sheet};
+pub use sheet::{difference_sheet, heat_color, heat_sheet, marked_sheet};
 
 /// An image of 8 bits a channel, RGBA, sRGB, row by row from the top.
 #[derive(Clone, Debug, PartialEq, Eq)]

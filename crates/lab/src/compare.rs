@@ -104,19 +104,24 @@ fn judge(result: &mut RunResult, chosen: &Chosen, psnr_db: f64, spec: &FrameSpec
     if reference.id() != "forward" || spec.view != view::FINAL {
         return;
     }
-    // A filter decides by the image: a difference of rounding may become another decision.
-    let is_plain = spec.samples == 1 && spec.effects.post.filter == Post::None;
-    let least_db = match exactness_of(chosen.technique, &chosen.params, spec.samples) {
-        Exactness::Exact { min_psnr_db } if is_plain => min_psnr_db,
-        Exactness::Exact { .. } => MULTISAMPLE_PSNR_DB,
-        Exactness::Approximate { min_psnr_db, .. } => min_psnr_db,
-    };
+    let least_db = least_psnr_db(chosen, spec.samples, spec.effects.post.filter);
     if psnr_db < least_db {
         result.status = Status::Failed;
         result.reason = Some(format!(
             "PSNR to {}: found {psnr_db:.1} dB, expected at least {least_db:.1} dB",
             reference.id()
         ));
+    }
+}
+
+/// Least PSNR to `forward` that a technique must have with its parameters, dB.
+pub(crate) fn least_psnr_db(chosen: &Chosen, samples: u32, filter: Post) -> f64 {
+    // A filter decides by the image: a difference of rounding may become another decision.
+    let is_plain = samples == 1 && filter == Post::None;
+    match exactness_of(chosen.technique, &chosen.params, samples) {
+        Exactness::Exact { min_psnr_db } if is_plain => min_psnr_db,
+        Exactness::Exact { .. } => MULTISAMPLE_PSNR_DB,
+        Exactness::Approximate { min_psnr_db, .. } => min_psnr_db,
     }
 }
 

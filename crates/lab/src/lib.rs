@@ -2,7 +2,8 @@
 //! another or in turn, images compared.
 //!
 //! A [`FrameSpec`] says what to draw and where; a [`Session`] is that scene on that device; [`measure`] and [`measure_in_turn`]
-//! draw frames of [`Chosen`] techniques and return run records; [`compare`] does so for several and judges their images. A
+//! draw frames of [`Chosen`] techniques and return run records; [`compare`] does so for several and judges their images;
+//! [`verify`](verify::verify) does so from views that it draws at random. A
 //! [`Listener`] hears how far work is: nothing here prints.
 //!
 //! ```no_run
@@ -31,6 +32,7 @@ mod session;
 mod setup;
 pub mod spec;
 mod trial;
+pub mod verify;
 
 pub use chosen::{Chosen, choose, technique};
 pub use compare::{Compared, check_samples_of, compare, failure, most_fragments};

@@ -101,6 +101,26 @@ fn load(source: &str, spec: &FrameSpec, listener: &dyn Listener) -> Result<(Devi
     Ok((device?, scene, ms_since(start)))
 }
 
+/// What frames of a scene look like by a specification.
+///
+/// # Errors
+/// A camera that the scene has not.
+pub(crate) fn settings_of(scene: &Scene, spec: &FrameSpec) -> Result<Settings, LabError> {
+    let lights = match spec.lights {
+        0 => scene.lights.clone(),
+        count => lights::seeded_lights(&scene.bounds_ws(), count, spec.light_seed),
+    };
+    Ok(Settings {
+        samples: spec.samples,
+        camera: camera::select(scene, spec.camera.as_deref())?,
+        lights,
+        environment: scene.environment,
+        effects: spec.effects,
+        view: spec.view.clone(),
+        ..Settings::for_scene(scene, spec.width, spec.height)
+    })
+}
+
 impl Session {
     /// Loads a scene while the device opens, and uploads it. Linear radiance is kept where `keep_hdr` says so.
     ///
@@ -113,7 +133,21 @@ impl Session {
         listener: &dyn Listener,
     ) -> Result<Session, LabError> {
         let (device, scene, load_ms) = load(source, spec, listener)?;
-        Session::with_device(&device, source, scene, spec, keep_hdr, listener, load_ms)
+        Session::with_device(&device, source, &scene, spec, keep_hdr, listener, load_ms)
+    }
+
+    /// As [`Session::open`], with the scene, for who looks at it without a device as well.
+    ///
+    /// # Errors
+    /// As [`Session::open`].
+    pub fn open_with_scene(
+        source: &str,
+        spec: &FrameSpec,
+        listener: &dyn Listener,
+    ) -> Result<(Session, Scene), LabError> {
+        let (device, scene, load_ms) = load(source, spec, listener)?;
+        let session = Session::with_device(&device, source, &scene, spec, false, listener, load_ms)?;
+        Ok((session, scene))
     }
 
     /// As [`Session::open`], with a camera path: the file's, else a fly-through of the scene. The view is that of its start unless
@@ -135,7 +169,8 @@ impl Session {
         if spec.effects.indirect.method != Indirect::None && spec.lights == 0 && scene.lights.is_empty() {
             spec.lights = 1;
         }
-        let session = Session::with_device(&device, source, scene, spec, false, listener, load_ms)?;
+        let session = Session::with_device(&device, source, &scene, spec, false, listener, load_ms)?;
+        drop(scene);
         match spec.camera {
             Some(_) => Ok((session, path)),
             None => Ok((session.look(path.at(0.0))?, path)),
@@ -170,30 +205,16 @@ impl Session {
     fn with_device(
         device: &Device,
         source: &str,
-        scene: Scene,
+        scene: &Scene,
         spec: &FrameSpec,
         keep_hdr: bool,
         listener: &dyn Listener,
         load_ms: f64,
     ) -> Result<Session, LabError> {
         let start = Instant::now();
-        let camera = camera::select(&scene, spec.camera.as_deref())?;
-        let lights = match spec.lights {
-            0 => scene.lights.clone(),
-            count => lights::seeded_lights(&scene.bounds_ws(), count, spec.light_seed),
-        };
-        let settings = Settings {
-            samples: spec.samples,
-            camera,
-            lights,
-            environment: scene.environment,
-            keep_hdr,
-            effects: spec.effects,
-            view: spec.view.clone(),
-            ..Settings::for_scene(&scene, spec.width, spec.height)
-        };
+        let settings = Settings { keep_hdr, ..settings_of(scene, spec)? };
         let bar = listener.task("textures", scene.images.len() as u64);
-        let on_device = SceneGpu::upload(device, &scene, &|done, steps| {
+        let on_device = SceneGpu::upload(device, scene, &|done, steps| {
             bar.place(done as u64, steps as u64);
         });
         drop(bar);
@@ -204,11 +225,10 @@ impl Session {
             draws: scene.instances.len() as u64,
             lights: settings.lights.len() as u64,
         };
-        let vertices = afterlight_predict::vertices(&scene);
+        let vertices = afterlight_predict::vertices(scene);
         let workload = afterlight_predict::of_view(scene.instances.len() as f64, vertices, &settings);
         let mut warnings = scene.warnings.clone();
         warnings.extend(on_device.warnings.iter().cloned());
-        drop(scene);
         let camera = settings.camera.name.clone();
         let renderer = Renderer::with_scene(device, Arc::clone(&on_device), &settings)?;
         warnings.extend(renderer.warnings());

@@ -167,9 +167,9 @@ fn run_group(
     group.into_iter().map(finish).collect()
 }
 
-/// A result that says why there are no figures.
-fn without_figures(chosen: &Chosen, error: &TechniqueError) -> Measured {
-    let status = match error {
+/// Whether an error says that the device or the technique cannot do what is asked for, or that it broke off.
+pub(crate) fn status_of(error: &TechniqueError) -> Status {
+    match error {
         TechniqueError::Unavailable { .. }
         | TechniqueError::Untessellated { .. }
         | TechniqueError::Samples { .. }
@@ -180,8 +180,12 @@ fn without_figures(chosen: &Chosen, error: &TechniqueError) -> Measured {
             Status::Unavailable
         }
         _ => Status::Failed,
-    };
-    let mut result = RunResult::without_figures(chosen.id(), status, error.to_string());
+    }
+}
+
+/// A result that says why there are no figures.
+fn without_figures(chosen: &Chosen, error: &TechniqueError) -> Measured {
+    let mut result = RunResult::without_figures(chosen.id(), status_of(error), error.to_string());
     result.params = params_record(chosen);
     Measured { result, image: None, radiance: None }
 }

@@ -10,6 +10,7 @@ pub mod packing;
 pub mod raster;
 pub mod rsm;
 pub mod shadow;
+pub mod sight;
 pub mod tangent;
 pub mod texture;
 pub mod tiles;

@@ -143,6 +143,37 @@ impl<'a> RayScene<'a> {
         best
     }
 
+    /// Surfaces without alpha blending along a ray, from near to far, up to the first one that is not doubtful; masked ones whatever their alpha,
+    /// so `is_doubtful` must say so of them.
+    pub fn surfaces(&self, ray: &Ray, is_doubtful: impl Fn(&Hit) -> bool) -> Vec<Hit> {
+        let mut hits: Vec<Hit> = Vec::new();
+        let mut farthest_m = ray.range_m[1];
+        let mut stack = vec![0usize];
+        while let Some(n) = stack.pop() {
+            let Some(node) = self.nodes.get(n) else { continue };
+            if !meets_box(node, ray, farthest_m) {
+                continue;
+            }
+            if node.count == 0 {
+                stack.extend([node.first as usize, n + 1]);
+                continue;
+            }
+            for triangle in &self.triangles[node.first as usize..][..node.count as usize] {
+                let Some(hit) = self.meets(triangle, ray).filter(|hit| hit.distance_m <= farthest_m) else {
+                    continue;
+                };
+                if !is_doubtful(&hit) {
+                    farthest_m = hit.distance_m;
+                }
+                hits.push(hit);
+            }
+        }
+        hits.sort_by(|a, b| a.distance_m.total_cmp(&b.distance_m));
+        let closed = hits.iter().position(|hit| !is_doubtful(hit));
+        hits.truncate(closed.map_or(hits.len(), |last| last + 1));
+        hits
+    }
+
     /// Surfaces with alpha blending along a ray before a view distance, from far to near.
     pub fn layers(&self, ray: &Ray, before_m: f64) -> Vec<Hit> {
         let hits = self.blended.iter().filter_map(|triangle| self.meets(triangle, ray));
@@ -156,7 +187,8 @@ impl<'a> RayScene<'a> {
         self.base_color(self.material(hit.instance), &self.attributes(hit)).w
     }
 
-    fn material(&self, instance: u32) -> &'a Material {
+    /// The material of an instance.
+    pub fn material(&self, instance: u32) -> &'a Material {
         let mesh = self.scene.instances[instance as usize].mesh;
         &self.scene.materials[self.scene.meshes[mesh as usize].material as usize]
     }
@@ -221,15 +253,7 @@ impl<'a> RayScene<'a> {
     /// Whether a material of an instance has textures that are files: those are not read here, so shading is that of the
     /// factors alone.
     pub fn has_unread_textures(&self, instance: u32) -> bool {
-        let m = self.material(instance);
-        let textures = [
-            &m.base_color_texture,
-            &m.metallic_roughness_texture,
-            &m.normal_texture,
-            &m.occlusion_texture,
-            &m.emissive_texture,
-        ];
-        textures.into_iter().flatten().any(|t| {
+        self.material(instance).textures().any(|t| {
             !matches!(self.scene.images[t.image as usize].data, afterlight_scene::ImageData::Rgba8 { .. })
         })
     }
@@ -341,9 +365,14 @@ impl<'a> RayScene<'a> {
 
 /// The ray through the centre of a pixel, row 0 on top.
 pub fn pixel_ray(camera: &Camera, pixel: [u32; 2], size_px: [u32; 2]) -> Ray {
+    ray_through(camera, DVec2::new(f64::from(pixel[0]), f64::from(pixel[1])) + 0.5, size_px)
+}
+
+/// The ray through a place of an image, pixels from its upper left corner.
+pub fn ray_through(camera: &Camera, place_px: DVec2, size_px: [u32; 2]) -> Ray {
     let [width, height] = size_px.map(f64::from);
-    let right = (f64::from(pixel[0]) + 0.5) * 2.0 / width - 1.0;
-    let up = 1.0 - (f64::from(pixel[1]) + 0.5) * 2.0 / height;
+    let right = place_px.x * 2.0 / width - 1.0;
+    let up = 1.0 - place_px.y * 2.0 / height;
     let aspect = width / height;
     let pose = world_from_view(camera);
     match camera.projection {

@@ -6,4 +6,4 @@
 mod renderer;
 pub mod supersample;
 
-pub use renderer::{Prepared, Renderer};
+pub use renderer::{Prepared, Renderer, StoredDepth};

@@ -10,8 +10,8 @@ use afterlight_scene::Scene;
 use afterlight_shader::{Shader, structs::FrameConstants};
 
 use afterlight_frame::{
-    Board, CameraView, Cull, DrawParams, Frame, LightPairs, MAX_DISPLACEMENT_MM, MIN_TESSELLATE_PX, Params,
-    SceneBuffers, SceneLights, Settings, Technique, TechniqueError, TessellationEffect,
+    Board, CameraView, Cull, DrawParams, Frame, LightPairs, MAX_DISPLACEMENT_MM, MIN_TESSELLATE_PX,
+    OpaqueDepth, Params, SceneBuffers, SceneLights, Settings, Technique, TechniqueError, TessellationEffect,
     camera_view::background_radiance,
     capacity::{self, Capacities, Counter, Demand},
     completed,
@@ -281,6 +281,7 @@ impl Renderer {
         indirect::record(&mut graph, &mut frame, settings)?;
         shadow::record(&mut graph, &mut frame, settings)?;
         let mut hdr = technique.record(&mut graph, &frame)?;
+        let depth_id = if settings.keep_depth { keep_depth(&mut graph, &frame) } else { None };
         if let Some(blended) = blended {
             hdr = transparent::draw(&mut graph, &frame, blended, hdr)?;
         }
@@ -300,6 +301,8 @@ impl Renderer {
             executor,
             demands: capacities.demands(),
             hdr: hdr_id.filter(|_| settings.keep_hdr),
+            depth: depth_id
+                .map(|depth| (depth, view.constants(settings, &self.lights, &self.scene).depth_to_distance)),
             light_pairs: hdr_id.filter(|_| counts_pairs),
             samples: settings.samples,
             final_color: final_id,
@@ -344,6 +347,15 @@ impl Renderer {
     }
 }
 
+/// Keeps the depth of the frame's opaque surfaces, where the technique has drawn it at one sample in the size of the frame.
+fn keep_depth(graph: &mut Graph, frame: &Frame<'_>) -> Option<ResourceId> {
+    let depth = frame.board.take::<OpaqueDepth>()?;
+    let is_readable = frame.samples == 1;
+    let id = is_readable.then(|| graph.keep(&depth.0));
+    frame.board.put(depth);
+    id
+}
+
 fn check_size(device: &gpu::Device, settings: &Settings) -> Result<(), TechniqueError> {
     let limit = u64::from(device.features().max_image_dimension_2d);
     for (what, found) in [
@@ -359,11 +371,22 @@ fn check_size(device: &gpu::Device, settings: &Settings) -> Result<(), Technique
     Ok(())
 }
 
+/// Depth as the device has stored it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StoredDepth {
+    /// One a pixel, rows from the top; reversed, 0 where there is no surface.
+    pub values: Vec<f32>,
+    /// `[a, b, c, d]`: a depth z is at the view distance `(a z + b) / (c z + d)`, metres.
+    pub to_distance: [f32; 4],
+}
+
 /// A technique ready to run, as often as wanted.
 pub struct Prepared {
     executor: Executor,
     demands: Vec<Demand>,
     hdr: Option<ResourceId>,
+    /// Depth of opaque surfaces, and how it becomes a view distance.
+    depth: Option<(ResourceId, [f32; 4])>,
     /// Counts of pairs in the place of radiance.
     light_pairs: Option<ResourceId>,
     samples: u32,
@@ -419,6 +442,20 @@ impl Prepared {
     /// The last frame's linear radiance as it lies on the device, RGBA16F.
     pub fn hdr_bytes(&mut self) -> Result<Option<Vec<u8>>, TechniqueError> {
         Ok(self.hdr.map(|hdr| self.executor.read_image(hdr)).transpose()?)
+    }
+
+    /// Depth of the last frame's opaque surfaces. `None` unless [`Settings::keep_depth`] was set and the technique has drawn 32-bit depth at one
+    /// sample, in the size of the frame.
+    ///
+    /// # Errors
+    /// The device.
+    pub fn depth(&mut self) -> Result<Option<StoredDepth>, TechniqueError> {
+        let Some((depth, to_distance)) = self.depth else { return Ok(None) };
+        let bytes = self.executor.read_image(depth)?;
+        let values: Vec<f32> =
+            bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
+        let pixels = self.width_px as usize * self.height_px as usize;
+        Ok((bytes.len() == 4 * pixels).then_some(StoredDepth { values, to_distance }))
     }
 
     /// What the last frame counted of everything that can overflow: what it needed, what there was, what was dropped.

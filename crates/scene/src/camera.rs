@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::{Aabb, Camera, Instance, Scene, SceneError};
+use crate::{Aabb, Camera, Instance, Projection, Scene, SceneError};
 
 /// Near plane of a camera given by numbers, and the farthest of one made to fit, metres.
 const NEAR_MAX_M: f32 = 0.1;
@@ -23,7 +23,8 @@ const EYE_HEIGHT_M: f32 = 1.7;
 const INTERIOR_TRIANGLES_MAX: u64 = 200_000;
 
 /// The camera that `--camera` asks for: a name, an index into [`Scene::cameras`], or
-/// `x,y,z,tx,ty,tz,fov_deg` (eye, target, vertical angle of view in degrees; near plane 0.1 m).
+/// `x,y,z,tx,ty,tz,fov_deg[,near_m]` (eye, target, vertical angle of view in degrees, near plane, 0.1 m where it is left out), or
+/// `x,y,z,tx,ty,tz,orthographic,half_height_m,near_m,far_m` for a view without perspective.
 /// Without a request the scene's first camera, or [`default_camera`] where it has none.
 ///
 /// # Errors
@@ -42,7 +43,8 @@ pub fn select(scene: &Scene, spec: Option<&str>) -> Result<Camera, SceneError> {
         name: "--camera".to_owned(),
         found: format!("'{}'", crate::error::one_line(spec)),
         expected: format!(
-            "{}, or x,y,z,tx,ty,tz,fov_deg with fov_deg between 0 and 180 and a target off the eye",
+            "{}, or x,y,z,tx,ty,tz,fov_deg[,near_m] with fov_deg between 0 and 180 and a target off the eye, or \
+             x,y,z,tx,ty,tz,orthographic,half_height_m,near_m,far_m",
             known_cameras(scene)
         ),
     })
@@ -68,14 +70,39 @@ fn known_cameras(scene: &Scene) -> String {
     format!("one of {}", names.join(", "))
 }
 
-/// A camera of seven numbers with commas between.
+/// The word that stands in the place of the angle of view of a camera without perspective.
+const ORTHOGRAPHIC: &str = "orthographic";
+
+/// A camera of numbers with commas between: eye, target, and a lens. The lens is a vertical angle of view in degrees, followed by the near
+/// plane where that is not 0.1 m; or the word `orthographic`, half the height of the view, the near and the far plane.
 fn from_numbers(spec: &str) -> Option<Camera> {
-    let numbers: Vec<f32> = spec.split(',').map(|n| n.trim().parse().ok()).collect::<Option<_>>()?;
-    let &[x, y, z, tx, ty, tz, fov_deg] = numbers.as_slice() else { return None };
+    let parts: Vec<&str> = spec.split(',').map(str::trim).collect();
+    let (place, lens) = parts.split_at_checked(6)?;
+    let number = |part: &&str| part.parse::<f32>().ok().filter(|number| number.is_finite());
+    let place: Vec<f32> = place.iter().map(number).collect::<Option<_>>()?;
+    let &[x, y, z, tx, ty, tz] = place.as_slice() else { return None };
     let (eye_ws, target_ws) = (Vec3::new(x, y, z), Vec3::new(tx, ty, tz));
-    let looks = (target_ws - eye_ws).try_normalize().is_some();
-    let sound = eye_ws.is_finite() && looks && fov_deg > 0.0 && fov_deg < 180.0;
-    sound.then(|| Camera::look_at("command line", eye_ws, target_ws, fov_deg.to_radians(), NEAR_MAX_M))
+    (target_ws - eye_ws).try_normalize()?;
+    let projection = match lens {
+        [ORTHOGRAPHIC, sizes @ ..] => {
+            let sizes: Vec<f32> = sizes.iter().map(number).collect::<Option<_>>()?;
+            let &[half_height_m, near_m, far_m] = sizes.as_slice() else { return None };
+            let sound = half_height_m > 0.0 && near_m >= 0.0 && far_m > near_m;
+            sound.then_some(Projection::Orthographic { half_height_m, near_m, far_m })?
+        }
+        [fov_deg, near_m @ ..] if near_m.len() <= 1 => {
+            let fov_deg = number(fov_deg).filter(|fov_deg| *fov_deg > 0.0 && *fov_deg < 180.0)?;
+            let near_m = near_m.first().map_or(Some(NEAR_MAX_M), number).filter(|near_m| *near_m > 0.0)?;
+            Projection::Perspective { fov_y_rad: fov_deg.to_radians(), near_m }
+        }
+        _ => return None,
+    };
+    Some(Camera { projection, ..Camera::look_at("command line", eye_ws, target_ws, 1.0, NEAR_MAX_M) })
+}
+
+/// Near plane of a camera that is made to fit a scene of this extent, metres.
+pub fn near_of_extent_m(extent_m: f32) -> f32 {
+    (extent_m / EXTENT_PER_NEAR).min(NEAR_MAX_M)
 }
 
 /// A camera made to fit the scene.
@@ -97,7 +124,7 @@ pub fn default_camera(scene: &Scene) -> Camera {
             NEAR_MAX_M,
         );
     }
-    let near_m = (extent_m / EXTENT_PER_NEAR).min(NEAR_MAX_M);
+    let near_m = near_of_extent_m(extent_m);
     if is_interior(scene, bounds_ws.center()) {
         interior_camera(scene, &bounds_ws, near_m)
     } else {
@@ -182,7 +209,7 @@ fn direction_bin(direction: Vec3) -> usize {
 }
 
 /// Corners of a triangle of an instance, counter-clockwise from its front whatever the instance mirrors.
-fn world_triangle(scene: &Scene, instance: &Instance, triangle: usize) -> [Vec3; 3] {
+pub(crate) fn world_triangle(scene: &Scene, instance: &Instance, triangle: usize) -> [Vec3; 3] {
     let mesh = &scene.meshes[instance.mesh as usize];
     let first = mesh.first_index as usize + 3 * triangle;
     let corner = |k: usize| {
@@ -375,8 +402,7 @@ impl Camera {
     /// Distance of the near plane, metres.
     pub fn clip_near_m(&self) -> f32 {
         match self.projection {
-            crate::Projection::Perspective { near_m, .. }
-            | crate::Projection::Orthographic { near_m, .. } => near_m,
+            Projection::Perspective { near_m, .. } | Projection::Orthographic { near_m, .. } => near_m,
         }
     }
 }

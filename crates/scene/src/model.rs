@@ -358,6 +358,20 @@ impl Default for Material {
     }
 }
 
+impl Material {
+    /// All textures that it has.
+    pub fn textures(&self) -> impl Iterator<Item = &TextureRef> {
+        let all = [
+            &self.base_color_texture,
+            &self.metallic_roughness_texture,
+            &self.normal_texture,
+            &self.occlusion_texture,
+            &self.emissive_texture,
+        ];
+        all.into_iter().flatten()
+    }
+}
+
 impl Aabb {
     /// The empty box.
     pub const EMPTY: Self = Self { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY };

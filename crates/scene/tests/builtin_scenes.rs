@@ -1,7 +1,7 @@
 //! The built-in scenes: sound, deterministic, of the size that was asked for.
 
 use afterlight_scene::{
-    AlphaMode, Camera, Scene, SceneError,
+    AlphaMode, Camera, Projection, Scene, SceneError,
     builtin::{build, edge_coverage, list},
     camera,
 };
@@ -193,12 +193,41 @@ fn cameras_are_chosen_by_name_index_and_numbers() {
         "1,2,3,4,5,6,0",
         "1,2,3,4,5,6,180",
         "nan,2,3,4,5,6,60",
-        "1,2,3,4,5,6,60,7",
+        "1,2,3,4,5,6,60,0",
+        "1,2,3,4,5,6,60,7,8",
+        "1,2,3,4,5,6,orthographic",
+        "1,2,3,4,5,6,orthographic,0,1,2",
+        "1,2,3,4,5,6,orthographic,1,2,2",
         "1e39,0,0,1,1,1,40",
     ] {
         let error = camera::select(&scene, Some(bad)).expect_err(bad).to_string();
         assert!(error.contains("'nave'") && error.contains("fov_deg") && !error.contains('\n'), "{error}");
     }
+}
+
+/// What `verify` prints is read back to the same camera, bit by bit.
+#[test]
+fn cameras_of_numbers_have_a_near_plane_or_no_perspective() {
+    let scene = colonnade_small();
+    let of = |spec: &str| camera::select(&scene, Some(spec)).expect(spec).projection;
+    let [near_m, half_height_m] = [0.1f32 / 3.0, 1e-7 / 7.0];
+    assert_eq!(
+        of(&format!("1,2,3,4,2,3,60,{near_m}")),
+        Projection::Perspective { fov_y_rad: 60f32.to_radians(), near_m }
+    );
+    assert_eq!(
+        of(&format!("1,2,3,4,2,3,orthographic,{half_height_m},0,{}", 1e6)),
+        Projection::Orthographic { half_height_m, near_m: 0.0, far_m: 1e6 }
+    );
+}
+
+#[test]
+fn the_floor_is_two_triangles_below_a_standing_eye() {
+    let scene = build("builtin:floor").expect("is there");
+    assert_eq!(scene.triangle_count(), 2);
+    assert_eq!(scene.bounds_ws().size(), Vec3::new(40.0, 0.0, 40.0));
+    assert_eq!(scene.cameras[0].eye_ws(), Vec3::new(0.0, 1.7, 0.0));
+    assert_eq!(scene.cameras[0].clip_near_m(), 0.004);
 }
 
 #[test]

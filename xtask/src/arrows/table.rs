@@ -141,8 +141,9 @@ pub static TABLE: Table = Table {
                 "crates/techniques",
                 "crates/measure",
                 "crates/image",
+                "crates/oracle",
             ],
-            reason: "trials and comparisons, for a command line, a viewer or another language",
+            reason: "trials and comparisons, also with rays in f64, for a command line, a viewer or another language",
         },
         Crate {
             folder: "crates/experiments",

@@ -7,6 +7,7 @@ pub mod devices;
 pub mod render;
 pub mod scene;
 pub mod techniques;
+pub mod verify;
 
 use afterlight_lab::{Listener, Session};
 

@@ -120,6 +120,12 @@ const BUILTINS: &[Builtin] = &[
         keys: &[Key { name: "blades", default: 8, min: 2, max: 256, about: "triangles about the axis" }],
         make: |v| simple::intersect(v.get("blades")),
     },
+    Builtin {
+        name: "floor",
+        about: "a floor of two large triangles, seen from a standing person's eye above its middle",
+        keys: &[Key { name: "width", default: 40, min: 1, max: 100_000, about: "width and depth, metres" }],
+        make: |v| simple::floor(v.get("width")),
+    },
 ];
 
 /// All built-in scenes.

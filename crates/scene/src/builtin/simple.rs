@@ -270,6 +270,28 @@ pub(super) fn intersect(blades: u32) -> Scene {
     b.scene
 }
 
+/// Two triangles in the plane y = 0, and an eye 1.7 m above their middle: both reach from behind the eye to the horizon, so
+/// they cross the near plane and lie far outside of the image, where an imprecise rasteriser goes wrong.
+pub(super) fn floor(width_m: u32) -> Scene {
+    let mut b = SceneBuilder::default();
+    let material = b.material(plain("floor", [0.6, 0.55, 0.5], 0.0, 0.7));
+    let width_m = f64::from(width_m);
+    let mut mesh = MeshData::default();
+    let corner = DVec3::new(-0.5 * width_m, 0.0, -0.5 * width_m);
+    mesh.rectangle([1, 1], DVec3::Y, corner, [DVec3::X * width_m, DVec3::Z * width_m], 1.0);
+    b.add("floor", &mesh, material);
+    b.scene.lights = vec![
+        sun(Vec3::new(-0.3, -1.0, -0.5), Vec3::splat(1.5)),
+        lamp(Vec3::new(1.5, 1.0, -4.0), Vec3::splat(8.0)),
+    ];
+    b.scene.environment =
+        Environment { ambient_radiance: Vec3::splat(0.1), background_radiance: Vec3::new(0.05, 0.06, 0.08) };
+    let (eye_ws, target_ws) = (Vec3::new(0.0, 1.7, 0.0), Vec3::new(3.0, 1.2, -4.0));
+    let near_m = crate::camera::near_of_extent_m(width_m as f32);
+    b.scene.cameras = vec![Camera::look_at("standing", eye_ws, target_ws, 60f32.to_radians(), near_m)];
+    b.scene
+}
+
 /// Length of the loop of `builtin:moving`, seconds.
 const LOOP_S: f32 = 4.0;
 
