@@ -122,6 +122,27 @@ mod tests {
         );
     }
 
+    /// What is exact goes by the samples and the parameters of the run.
+    #[test]
+    fn approximate_ways_are_not_concluded_of() {
+        let mut by_samples = result("deferred-ssaa", Some(2.0), 1);
+        by_samples.params.insert("position".to_owned(), "sample".into());
+        let mut run = run(vec![
+            result("light-prepass", Some(1.0), 1),
+            by_samples,
+            result("deferred-ssaa", Some(3.0), 1),
+            result("forward", Some(4.0), 1),
+        ]);
+        run.settings.samples = 4;
+        let fastest = |run: &Run| {
+            let found = Conclusion::of(run).fastest_exact.expect("exact ones ran");
+            (found.technique.clone(), found.frame_ms.map(|ms| ms.median))
+        };
+        assert_eq!(fastest(&run), ("deferred-ssaa".to_owned(), Some(3.0)));
+        run.settings.samples = 1;
+        assert_eq!(fastest(&run), ("light-prepass".to_owned(), Some(1.0)));
+    }
+
     #[test]
     fn without_figures_nothing_is_concluded() {
         let run = run(vec![result("deferred", None, 0)]);
