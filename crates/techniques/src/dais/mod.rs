@@ -30,7 +30,7 @@ use afterlight_stages::{
     surfaces::{
         compute_raster::{ComputeRasterParams, Visibility},
         shade,
-        triangles::{self, RecordParams, Records, Tangents},
+        triangles::{self, RecordParams, Records},
         visible::NO_TRIANGLE_RGBA8,
         visible::Visible,
     },
