@@ -238,6 +238,7 @@ mod tests {
         let demand = |capacity, fixed| Demand {
             name: "blocks",
             resource: kept(),
+            first_word: 0,
             capacity,
             fixed,
             slack_eighths: STEADY,
