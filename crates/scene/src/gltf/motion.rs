@@ -67,12 +67,16 @@ fn convert_one(
             return Err(invalid("a node with a matrix", "a node with translation, rotation and scale"));
         }
         let Some(node) = placement.scene_node[target] else { continue };
-        let rest = rest_trs(accessors.file, root, target)?;
+        let rest = rest_trs(accessors.file, root, &placement.places, target)?;
         let track = tracks.entry(node).or_insert_with(|| NodeTrack {
             node,
             rest_translation: rest.translation,
-            rest_rotation: rest.rotation,
-            rest_scale: rest.scale,
+            rest_rotation: if rest.rotation.length_squared() > 0.0 {
+                rest.rotation.normalize().as_quat()
+            } else {
+                Quat::IDENTITY
+            },
+            rest_scale: rest.scale.as_vec3(),
             ..NodeTrack::default()
         });
         let output = sampler.output.value();
