@@ -8,6 +8,8 @@ use afterlight_graph::{
 };
 use afterlight_shader::Shader;
 
+use bytemuck::Zeroable as _;
+
 use crate::{
     Board, Params, Slots, TechniqueError,
     capacity::Capacities,
@@ -172,15 +174,21 @@ impl Frame<'_> {
     ) -> Result<DrawCommands, TechniqueError> {
         let rows = Rows::new(self.clip_from_world, rows, self.height_px);
         let mut commands: Vec<DrawCommand> = Vec::new();
-        let mut first = [0; BUCKETS + 1];
+        let (mut first, mut counts) = ([0; BUCKETS + 1], [0; BUCKETS]);
         for (bucket, visible) in self.visible.iter().enumerate() {
+            let start = commands.len();
             let infos = visible.iter().map(|draw| (&self.scene.draw_infos[*draw as usize], *draw));
             let reached =
                 infos.filter(|(info, _)| rows.touch(&displaced(&info.bounds_ws, self.displacement_m)));
             commands.extend(reached.map(|(info, draw)| command(info, draw)));
+            counts[bucket] = (commands.len() - start) as u32;
+            // A bucket that the scene has is drawn, be it with no command: passes bind what its shaders read and write.
+            let is_there = self.scene.bucket_first[bucket] < self.scene.bucket_first[bucket + 1];
+            if is_there && counts[bucket] == 0 {
+                commands.push(DrawCommand::zeroed());
+            }
             first[bucket + 1] = commands.len() as u32;
         }
-        let counts: Vec<u32> = first.windows(2).map(|ends| ends[1] - ends[0]).collect();
         Ok(DrawCommands {
             commands: self.table(graph, name, BufferRole::Scene, bytemuck::cast_slice(&commands))?,
             counts: self.table(graph, &format!("{name} counts"), BufferRole::Scene, &counts)?,

@@ -156,8 +156,12 @@ impl NodeTrack {
 
 /// Parent from node, in 64 bits: a rotation that is rounded to 32 moves what is 1,400 km from its axis by 0.1 m.
 pub(crate) fn local(scale: DVec3, rotation: DQuat, translation: DVec3) -> DAffine3 {
-    let unit = if rotation.length_squared() > 0.0 { rotation.normalize() } else { DQuat::IDENTITY };
-    DAffine3::from_scale_rotation_translation(scale, unit, translation)
+    DAffine3::from_scale_rotation_translation(scale, unit(rotation), translation)
+}
+
+/// The rotation that a quaternion of any length stands for; none for that of length 0.
+pub(crate) fn unit(rotation: DQuat) -> DQuat {
+    if rotation.length_squared() > 0.0 { rotation.normalize() } else { DQuat::IDENTITY }
 }
 
 impl Animation {

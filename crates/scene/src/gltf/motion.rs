@@ -71,11 +71,7 @@ fn convert_one(
         let track = tracks.entry(node).or_insert_with(|| NodeTrack {
             node,
             rest_translation: rest.translation,
-            rest_rotation: if rest.rotation.length_squared() > 0.0 {
-                rest.rotation.normalize().as_quat()
-            } else {
-                Quat::IDENTITY
-            },
+            rest_rotation: rest.rotation.as_quat(),
             rest_scale: rest.scale.as_vec3(),
             ..NodeTrack::default()
         });

@@ -100,7 +100,7 @@ pub(super) fn rest_trs(file: &Path, root: &Root, places: &Places, index: usize) 
     let place = places.of(root, index);
     let trs = Trs {
         translation: place.translation.map_or(DVec3::ZERO, DVec3::from_array),
-        rotation: place.rotation.map_or(DQuat::IDENTITY, DQuat::from_array),
+        rotation: animation::unit(place.rotation.map_or(DQuat::IDENTITY, DQuat::from_array)),
         scale: place.scale.map_or(DVec3::ONE, DVec3::from_array),
     };
     let finite = trs.translation.as_vec3().is_finite() && trs.scale.as_vec3().is_finite();
