@@ -22,7 +22,7 @@ pub struct CameraView {
 impl CameraView {
     /// The view of the settings' camera at their width and height, its depths fitted to the scene.
     pub fn fitted(settings: &Settings, scene: &SceneGpu) -> Self {
-        let bounds_ws = scene.bounds_ws(settings.effects.tessellation.displacement_m());
+        let bounds_ws = scene.all_bounds_ws(settings.effects.tessellation.displacement_m());
         let (camera, eye_moved_m) = settings.camera.fitted(&bounds_ws);
         Self { eye_moved_m, ..Self::of(&camera, settings) }
     }

@@ -9,7 +9,7 @@ use afterlight_image::{Rgba8Image, psnr_db};
 use afterlight_oracle::raster::{RayScene, pixel_ray};
 use afterlight_renderer::Renderer;
 use afterlight_techniques::{
-    Exactness, Settings, Shadows, Technique, TechniqueError, find,
+    Settings, Shadows, Technique, TechniqueError, find,
     graph::gpu,
     registry,
     scene::{
@@ -17,7 +17,7 @@ use afterlight_techniques::{
         load_bytes,
     },
 };
-use common::{Stage, covered, image_of, params, psnr};
+use common::{Stage, covered, image_of, least_db, params, psnr};
 use glam::{Affine3A, DQuat, DVec3, Quat, Vec2, Vec3};
 use serde_json::{Value, json};
 
@@ -336,12 +336,6 @@ fn forward_is_what_rays_in_64_bits_find() {
     }
 }
 
-fn min_psnr(exactness: Exactness) -> f64 {
-    match exactness {
-        Exactness::Exact { min_psnr_db } | Exactness::Approximate { min_psnr_db, .. } => min_psnr_db,
-    }
-}
-
 /// Every technique at each number of samples that it has here, and other ways of filling, against `forward`; what shades at samples and
 /// not at the pixel's centre against itself at the origin, where there is such a scene with its settings.
 fn all_agree(stage: &Stage, settings: &Settings, what: &str, at_origin: Option<(&Stage, &Settings)>) {
@@ -364,7 +358,7 @@ fn all_agree(stage: &Stage, settings: &Settings, what: &str, at_origin: Option<(
                 let image = image_of(&mut prepared);
                 let mut db = psnr_db(&reference, &image).unwrap_or_else(|e| panic!("{e}"));
                 println!("{what}, {samples} samples: {} {way:?}: {db:.2} dB", info.id);
-                let mut least_db = min_psnr(info.exactness);
+                let mut least_db = least_db(*technique, &params(*technique, way), samples);
                 let at_samples = samples > 1 && ["deferred-ssaa", "deferred-msaa"].contains(&info.id);
                 if let Some((near, settings)) = at_origin.filter(|_| at_samples) {
                     let here = near.image(*technique, &Settings { samples, ..settings.clone() });
