@@ -1,7 +1,7 @@
 //! A camera's matrices for an image size, and what of the scene they bound.
 
-use afterlight_graph::Rect;
-use afterlight_scene::{Aabb, Projection};
+use afterlight_graph::{Rect, gpu::vk};
+use afterlight_scene::{Aabb, Camera, Projection};
 use afterlight_shader::structs::FrameConstants;
 use glam::{Mat4, Vec3, Vec4};
 
@@ -12,20 +12,40 @@ pub struct CameraView {
     /// World to clip space.
     pub clip_from_world: Mat4,
     view_from_world: Mat4,
-    /// The eye, world space, m.
+    projection: Projection,
+    /// The eye, world space, m; where a fitted orthographic view has moved it to.
     pub eye_ws: Vec3,
+    /// How far the eye was moved along the view: how much less view distances are than from the camera, m.
+    pub eye_moved_m: f32,
 }
 
 impl CameraView {
+    /// The view of the settings' camera at their width and height, its depths fitted to the scene.
+    pub fn fitted(settings: &Settings, scene: &SceneGpu) -> Self {
+        let bounds_ws = scene.all_bounds_ws(settings.effects.tessellation.displacement_m());
+        let (camera, eye_moved_m) = settings.camera.fitted(&bounds_ws);
+        Self { eye_moved_m, ..Self::of(&camera, settings) }
+    }
+
     /// The view of the settings' camera at their width and height.
     pub fn new(settings: &Settings) -> Self {
+        Self::of(&settings.camera, settings)
+    }
+
+    fn of(camera: &Camera, settings: &Settings) -> Self {
         let aspect = settings.width_px as f32 / settings.height_px as f32;
-        let view_from_world = settings.camera.view_from_world();
         Self {
-            clip_from_world: settings.camera.clip_from_view(aspect) * view_from_world,
-            view_from_world,
-            eye_ws: settings.camera.eye_ws(),
+            clip_from_world: camera.clip_from_world(aspect),
+            view_from_world: camera.view_from_world(),
+            projection: camera.projection,
+            eye_ws: camera.eye_ws(),
+            eye_moved_m: 0.0,
         }
+    }
+
+    /// The projection, fitted where the view is.
+    pub fn projection(&self) -> &Projection {
+        &self.projection
     }
 
     /// What the view distance of a point p, m, is: dot(xyz, p) + w. The view looks along -z.
@@ -36,12 +56,12 @@ impl CameraView {
     /// What `include/frame.glsl` declares, for this view.
     pub fn constants(&self, settings: &Settings, lights: &SceneLights, scene: &SceneGpu) -> FrameConstants {
         let distance_from_world = self.distance_from_world();
-        let near_m = match settings.camera.projection {
+        let near_m = match self.projection {
             Projection::Perspective { near_m, .. } | Projection::Orthographic { near_m, .. } => near_m,
         };
         let bounds_ws = scene.bounds_ws(settings.effects.tessellation.displacement_m());
         let to_eye = self.view_from_world.row(2).truncate();
-        let (depth_to_distance, eye) = match settings.camera.projection {
+        let (depth_to_distance, eye) = match self.projection {
             Projection::Perspective { near_m, .. } => {
                 (Vec4::new(0.0, near_m, 1.0, 0.0), self.eye_ws.extend(1.0))
             }
@@ -64,6 +84,28 @@ impl CameraView {
             distance_range_m: distance_range_m(&bounds_ws, distance_from_world, near_m),
         }
     }
+}
+
+/// What techniques with stencil lose on a device that has no 32-bit float depth with stencil, in words; `None` where it has.
+/// `range_m` is the nearest and farthest view distance of the scene.
+pub fn coarse_depth_warning(
+    format: vk::Format,
+    projection: &Projection,
+    range_m: [f32; 2],
+) -> Option<String> {
+    // Steps of depth: 2^-24 of the range of depth, which goes from 0 to 1.
+    let steps = f64::from(1 << 24);
+    let step_m = match *projection {
+        Projection::Perspective { near_m, .. } => f64::from(range_m[1]).powi(2) / (f64::from(near_m) * steps),
+        Projection::Orthographic { near_m, far_m, .. } => f64::from(far_m - near_m) / steps,
+    };
+    (format == vk::Format::D24_UNORM_S8_UINT).then(|| {
+        format!(
+            "depth with stencil has 24 bits on this device: techniques with a stencil confuse surfaces that are less than \
+             {step_m:.2e} m apart at {:.0} m",
+            range_m[1]
+        )
+    })
 }
 
 /// Nearest and farthest view distance, m, of what lies in a box and behind the near plane, with room for rounding. The nearest is
@@ -122,7 +164,6 @@ pub fn screen_rect(clip_from_world: Mat4, bounds: &Aabb, whole: Rect) -> Option<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use afterlight_scene::Camera;
     use proptest::prelude::*;
 
     const WHOLE: Rect = Rect { x_px: 0, y_px: 0, width_px: 100, height_px: 60 };
@@ -132,7 +173,7 @@ mod tests {
         #[test]
         fn the_rectangle_covers_the_box(c in prop::array::uniform3(-8f32..8.0), r in 0.1f32..3.0, p in prop::array::uniform3(-1f32..1.0)) {
             let clip = Camera::look_at("c", Vec3::new(0.0, 1.0, 9.0), Vec3::ZERO, 1.0, 0.1);
-            let clip = clip.clip_from_view(100.0 / 60.0) * clip.view_from_world();
+            let clip = clip.clip_from_world(100.0 / 60.0);
             let bounds = Aabb { min: Vec3::from(c) - r, max: Vec3::from(c) + r };
             let q = clip * (Vec3::from(c) + Vec3::from(p) * r).extend(1.0);
             prop_assume!(q.w > 0.0 && q.x.abs() <= q.w && q.y.abs() <= q.w);

@@ -1,15 +1,23 @@
 //! What a technique is given to record a frame.
 
+use std::ops::Range;
+
 use afterlight_graph::{
     BufferHandle, BufferRole, Graph, ImageHandle, ImageInfo, PassRole,
     gpu::{self, vk},
 };
 use afterlight_shader::Shader;
 
+use bytemuck::Zeroable as _;
+
 use crate::{
     Board, Params, Slots, TechniqueError,
     capacity::Capacities,
-    scene::{BUCKETS, SceneGpu, lights::SceneLights},
+    scene::{
+        BUCKETS, SceneGpu,
+        draw_list::{DrawCommand, Rows, command, displaced},
+        lights::SceneLights,
+    },
     set_constants, views,
 };
 
@@ -35,6 +43,9 @@ pub struct Frame<'a> {
     pub displacement_m: f32,
     /// World to clip. A technique that uses it while recording is recorded again when the camera moves.
     pub clip_from_world: glam::Mat4,
+    /// How much less view distances are in this frame than from the camera, m: the eye of an orthographic camera that is far from the
+    /// scene is moved towards it ([`CameraView::fitted`](crate::CameraView::fitted)).
+    pub eye_moved_m: f32,
     /// Radiance of pixels without a surface.
     pub background_radiance: [f32; 3],
     /// Buffers of the scene and the frame as the graph knows them.
@@ -81,6 +92,16 @@ pub struct SceneBuffers {
     pub volume: BufferHandle,
     /// Its indices.
     pub volume_indices: BufferHandle,
+}
+
+/// Indirect commands of draws, a range a bucket.
+pub struct DrawCommands {
+    /// The commands.
+    pub commands: BufferHandle,
+    /// Number of commands of each bucket.
+    pub counts: BufferHandle,
+    /// First command of each bucket, and the end.
+    pub first: [u32; BUCKETS + 1],
 }
 
 impl Frame<'_> {
@@ -133,18 +154,46 @@ impl Frame<'_> {
         Ok(graph.import_buffer(name, role, &buffer))
     }
 
-    /// The device's format for depth with stencil.
+    /// The device's format for depth with stencil. Depth is a float, however many bytes that takes: 24 fixed bits of reversed
+    /// depth are 0.6 m apart at 1 km from a near plane of 0.1 m. Where the device has nothing else, warnings say so
+    /// ([`coarse_depth_warning`](crate::camera_view::coarse_depth_warning)).
     pub fn depth_stencil_format(&self) -> vk::Format {
         self.device.depth_stencil_format()
     }
 
-    /// Depth with stencil in four bytes a sample where the device has it, else [`Self::depth_stencil_format`].
-    pub fn small_depth_stencil_format(&self) -> vk::Format {
-        let wanted = vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT | vk::FormatFeatureFlags::SAMPLED_IMAGE;
-        match self.device.format_supports(vk::Format::D24_UNORM_S8_UINT, wanted) {
-            true => vk::Format::D24_UNORM_S8_UINT,
-            false => self.depth_stencil_format(),
+    /// Brings the commands of the draws in view that may reach some rows of the image into the graph, in drawing order. The rows
+    /// alone cull: what the view does not cull stays in some rows at least.
+    ///
+    /// # Errors
+    /// The device.
+    pub fn draws_in_rows(
+        &self,
+        graph: &mut Graph,
+        name: &str,
+        rows: Range<u32>,
+    ) -> Result<DrawCommands, TechniqueError> {
+        let rows = Rows::new(self.clip_from_world, rows, self.height_px);
+        let mut commands: Vec<DrawCommand> = Vec::new();
+        let (mut first, mut counts) = ([0; BUCKETS + 1], [0; BUCKETS]);
+        for (bucket, visible) in self.visible.iter().enumerate() {
+            let start = commands.len();
+            let infos = visible.iter().map(|draw| (&self.scene.draw_infos[*draw as usize], *draw));
+            let reached =
+                infos.filter(|(info, _)| rows.touch(&displaced(&info.bounds_ws, self.displacement_m)));
+            commands.extend(reached.map(|(info, draw)| command(info, draw)));
+            counts[bucket] = (commands.len() - start) as u32;
+            // A bucket that the scene has is drawn, be it with no command: passes bind what its shaders read and write.
+            let is_there = self.scene.bucket_first[bucket] < self.scene.bucket_first[bucket + 1];
+            if is_there && counts[bucket] == 0 {
+                commands.push(DrawCommand::zeroed());
+            }
+            first[bucket + 1] = commands.len() as u32;
         }
+        Ok(DrawCommands {
+            commands: self.table(graph, name, BufferRole::Scene, bytemuck::cast_slice(&commands))?,
+            counts: self.table(graph, &format!("{name} counts"), BufferRole::Scene, &counts)?,
+            first,
+        })
     }
 
     /// Checks that one binding holds a buffer.

@@ -32,7 +32,7 @@ pub use effects::{
     PostEffect, ShadowEffect, Shadows, TessellationEffect, Transparency, TransparencyEffect,
 };
 pub use error::TechniqueError;
-pub use frame::{Frame, SceneBuffers};
+pub use frame::{DrawCommands, Frame, SceneBuffers};
 pub use params::{ParamError, ParamInfo, ParamKind, ParamSet, Params};
 pub use scene::{
     SceneGpu,

@@ -23,6 +23,8 @@ pub struct DeviceOptions {
     pub validate: bool,
     /// Folder of the pipeline cache; `None` keeps it in memory. A file that is corrupt or of another driver is ignored.
     pub pipeline_cache_dir: Option<PathBuf>,
+    /// Do without 32-bit float depth with stencil even where the device has it, as on a device that has it not: for tests.
+    pub without_float_stencil: bool,
 }
 
 /// A device of the list: what it is, what it can do, and what it lacks that the workbench needs.
@@ -41,6 +43,7 @@ pub(crate) struct DeviceInner {
     pub physical: vk::PhysicalDevice,
     pub memory: vk::PhysicalDeviceMemoryProperties,
     pub queue_family: u32,
+    without_float_stencil: bool,
     queue: Mutex<vk::Queue>,
     /// `None` only while the device is being dropped.
     allocator: Mutex<Option<Allocator>>,
@@ -127,6 +130,7 @@ impl Device {
             physical,
             memory,
             queue_family,
+            without_float_stencil: options.without_float_stencil,
             queue: Mutex::new(queue),
             allocator: Mutex::new(Some(allocator)),
             set_layouts: SetLayoutCache::default(),
@@ -180,10 +184,12 @@ impl Device {
         properties.optimal_tiling_features.contains(wanted)
     }
 
-    /// The device's format for depth with stencil: 32-bit float depth where it can be drawn to, else 24-bit.
+    /// The device's format for depth with stencil: 32-bit float depth where it can be drawn to, else 24-bit, one of which every
+    /// device has.
     pub fn depth_stencil_format(&self) -> vk::Format {
         let wanted = vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT | vk::FormatFeatureFlags::SAMPLED_IMAGE;
-        if self.format_supports(vk::Format::D32_SFLOAT_S8_UINT, wanted) {
+        let has_float = self.format_supports(vk::Format::D32_SFLOAT_S8_UINT, wanted);
+        if has_float && !self.0.without_float_stencil {
             vk::Format::D32_SFLOAT_S8_UINT
         } else {
             vk::Format::D24_UNORM_S8_UINT

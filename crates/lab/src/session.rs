@@ -63,6 +63,7 @@ pub fn open_device(spec: &FrameSpec) -> Result<Device, LabError> {
         select: spec.device.clone(),
         validate: spec.validate,
         pipeline_cache_dir: cache_folder(),
+        without_float_stencil: false,
     })?;
     check_samples(&device, spec.samples)?;
     Ok(device)
@@ -165,7 +166,7 @@ impl Session {
         // A path that does not read is told before a scene is loaded for it.
         let from_file = file.map(CameraPath::load).transpose()?;
         let (device, scene, load_ms) = load(source, spec, listener)?;
-        let path = from_file.unwrap_or_else(|| CameraPath::fly_through(&scene));
+        let path = from_file.map_or_else(|| CameraPath::fly_through(&scene), |path| path.through(&scene));
         if spec.effects.indirect.method != Indirect::None && spec.lights == 0 && scene.lights.is_empty() {
             spec.lights = 1;
         }

@@ -12,7 +12,7 @@ use afterlight_shader::{Shader, structs::FrameConstants};
 use afterlight_frame::{
     Board, CameraView, Cull, DrawParams, Frame, LightPairs, MAX_DISPLACEMENT_MM, MIN_TESSELLATE_PX,
     OpaqueDepth, Params, SceneBuffers, SceneLights, Settings, Technique, TechniqueError, TessellationEffect,
-    camera_view::background_radiance,
+    camera_view::{background_radiance, coarse_depth_warning},
     capacity::{self, Capacities, Counter, Demand},
     completed,
     scene::{SceneGpu, draw_list::DrawList},
@@ -107,16 +107,27 @@ impl Renderer {
         &self.settings
     }
 
-    /// Nearest and farthest view distance, m, that a surface of the scene can have in this view: what clusters lie between.
+    /// Nearest and farthest view distance, m, that a surface of the scene can have in this view: what clusters lie between. From the
+    /// eye as the frame has it, see [`CameraView::eye_moved_m`].
     pub fn distance_range_m(&self) -> [f32; 2] {
-        CameraView::new(&self.settings).constants(&self.settings, &self.lights, &self.scene).distance_range_m
+        self.view().constants(&self.settings, &self.lights, &self.scene).distance_range_m
     }
 
-    /// What of the settings this scene cannot give, a line each.
+    fn view(&self) -> CameraView {
+        CameraView::fitted(&self.settings, &self.scene)
+    }
+
+    /// What of the settings this scene or this device cannot give, a line each.
     pub fn warnings(&self) -> Vec<String> {
+        let coarse = coarse_depth_warning(
+            self.device.depth_stencil_format(),
+            self.view().projection(),
+            self.distance_range_m(),
+        );
         [indirect::warning, shadow::warning, transparent::warning]
             .into_iter()
             .filter_map(|warning| warning(&self.settings, &self.scene))
+            .chain(coarse)
             .collect()
     }
 
@@ -143,7 +154,7 @@ impl Renderer {
         let params = &completed(technique, params);
         let options = *params.typed::<DrawParams>();
         let settings = &self.settings;
-        let view = CameraView::new(settings);
+        let view = self.view();
         let mut draws = DrawList::new(&self.device, &self.scene, options)?;
         draws.update(
             &self.scene,
@@ -267,6 +278,7 @@ impl Renderer {
             scene: &self.scene,
             lights: &self.lights,
             clip_from_world: view.clip_from_world,
+            eye_moved_m: view.eye_moved_m,
             background_radiance: background_radiance(settings).into(),
             view: &settings.view,
             tessellate_px: settings.effects.tessellation.edge_px,

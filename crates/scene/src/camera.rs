@@ -23,7 +23,7 @@ const EYE_HEIGHT_M: f32 = 1.7;
 const INTERIOR_TRIANGLES_MAX: u64 = 200_000;
 
 /// The camera that `--camera` asks for: a name, an index into [`Scene::cameras`], or
-/// `x,y,z,tx,ty,tz,fov_deg[,near_m]` (eye, target, vertical angle of view in degrees, near plane, 0.1 m where it is left out), or
+/// `x,y,z,tx,ty,tz,fov_deg[,near_m]` (eye and target in the file's coordinates, vertical angle of view in degrees, near plane, 0.1 m where it is left out), or
 /// `x,y,z,tx,ty,tz,orthographic,half_height_m,near_m,far_m` for a view without perspective.
 /// Without a request the scene's first camera, or [`default_camera`] where it has none.
 ///
@@ -39,7 +39,7 @@ pub fn select(scene: &Scene, spec: Option<&str>) -> Result<Camera, SceneError> {
     if let Some(camera) = spec.parse().ok().and_then(|index: usize| scene.cameras.get(index)) {
         return Ok(camera.clone());
     }
-    from_numbers(spec).ok_or_else(|| SceneError::BadParameter {
+    from_numbers(scene, spec).ok_or_else(|| SceneError::BadParameter {
         name: "--camera".to_owned(),
         found: format!("'{}'", crate::error::one_line(spec)),
         expected: format!(
@@ -75,14 +75,15 @@ const ORTHOGRAPHIC: &str = "orthographic";
 
 /// A camera of numbers with commas between: eye, target, and a lens. The lens is a vertical angle of view in degrees, followed by the near
 /// plane where that is not 0.1 m; or the word `orthographic`, half the height of the view, the near and the far plane.
-fn from_numbers(spec: &str) -> Option<Camera> {
+fn from_numbers(scene: &Scene, spec: &str) -> Option<Camera> {
     let parts: Vec<&str> = spec.split(',').map(str::trim).collect();
     let (place, lens) = parts.split_at_checked(6)?;
     let number = |part: &&str| part.parse::<f32>().ok().filter(|number| number.is_finite());
-    let place: Vec<f32> = place.iter().map(number).collect::<Option<_>>()?;
+    let place: Vec<f64> = place.iter().map(|part| part.parse().ok()).collect::<Option<_>>()?;
     let &[x, y, z, tx, ty, tz] = place.as_slice() else { return None };
-    let (eye_ws, target_ws) = (Vec3::new(x, y, z), Vec3::new(tx, ty, tz));
-    (target_ws - eye_ws).try_normalize()?;
+    let [eye_ws, target_ws] =
+        [DVec3::new(x, y, z), DVec3::new(tx, ty, tz)].map(|point| scene.world_from_file(point));
+    (target_ws - eye_ws).try_normalize().filter(|_| eye_ws.is_finite())?;
     let projection = match lens {
         [ORTHOGRAPHIC, sizes @ ..] => {
             let sizes: Vec<f32> = sizes.iter().map(number).collect::<Option<_>>()?;
@@ -270,10 +271,10 @@ fn hit_triangle([a, b, c]: [Vec3; 3], origin: Vec3, direction: Vec3) -> f32 {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Keyframe {
-    /// Position of the eye, world space, metres.
-    pub eye_ws: [f32; 3],
-    /// Point that is looked at, world space, metres.
-    pub target_ws: [f32; 3],
+    /// Position of the eye in the file's coordinates, metres.
+    pub eye_ws: [f64; 3],
+    /// Point that is looked at in the file's coordinates, metres.
+    pub target_ws: [f64; 3],
     /// Vertical angle of view, degrees, between 0 and 180.
     pub fov_deg: f32,
 }
@@ -292,6 +293,9 @@ pub struct CameraPath {
     pub closed: bool,
     /// The keyframes, at least one.
     pub keyframes: Vec<Keyframe>,
+    /// [`Scene::origin_file`] of the scene that the path leads through: what cameras of the path are relative to.
+    #[serde(skip)]
+    pub origin_file: DVec3,
 }
 
 fn default_near_m() -> f32 {
@@ -342,7 +346,8 @@ impl CameraPath {
                     "degrees between 0 and 180",
                 ));
             }
-            if !k.eye_ws.iter().chain(&k.target_ws).all(|v| v.is_finite()) {
+            // Cameras have 32 bits.
+            if !k.eye_ws.iter().chain(&k.target_ws).all(|v| (*v as f32).is_finite()) {
                 return Err(SceneError::invalid(
                     file,
                     format!("keyframes[{i}]"),
@@ -364,8 +369,17 @@ impl CameraPath {
         let sound = center_ws.is_finite() && size_m.is_finite() && size_m.max_element() > 0.0;
         let eye_ws = camera.eye_ws();
         let inside = sound && eye_ws.cmpge(bounds_ws.min).all() && eye_ws.cmple(bounds_ws.max).all();
-        let keyframes = if inside { walk(&bounds_ws, eye_ws) } else { orbit(center_ws, eye_ws) };
-        Self { name: "fly-through".to_owned(), near_m, closed: true, keyframes }
+        let mut keyframes = if inside { walk(&bounds_ws, eye_ws) } else { orbit(center_ws, eye_ws) };
+        for point in keyframes.iter_mut().flat_map(|k| [&mut k.eye_ws, &mut k.target_ws]) {
+            *point = (scene.origin_file + DVec3::from_array(*point)).to_array();
+        }
+        let name = "fly-through".to_owned();
+        Self { name, near_m, closed: true, keyframes, origin_file: scene.origin_file }
+    }
+
+    /// The path through a scene: its cameras are relative to the scene's origin.
+    pub fn through(self, scene: &Scene) -> Self {
+        Self { origin_file: scene.origin_file, ..self }
     }
 
     /// The camera at `t` in [0, 1], clamped: 0 is the first keyframe, 1 the last (the first again where closed).
@@ -391,8 +405,9 @@ impl CameraPath {
         };
         let keys = [at(-1), at(0), at(1), at(2)];
         let u = place - span as f32;
-        let eye_ws = catmull_rom(keys.map(|k| Vec3::from_array(k.eye_ws)), u);
-        let target_ws = catmull_rom(keys.map(|k| Vec3::from_array(k.target_ws)), u);
+        let relative = |point: [f64; 3]| DVec3::from_array(point) - self.origin_file;
+        let eye_ws = catmull_rom(keys.map(|k| relative(k.eye_ws)), u);
+        let target_ws = catmull_rom(keys.map(|k| relative(k.target_ws)), u);
         let fov_deg = keys[1].fov_deg + (keys[2].fov_deg - keys[1].fov_deg) * u;
         Camera::look_at(&self.name, eye_ws, target_ws, fov_deg.to_radians(), self.near_m)
     }
@@ -415,8 +430,8 @@ fn walk(bounds_ws: &Aabb, eye_ws: Vec3) -> Vec<Keyframe> {
     let rise_ws = Vec3::Y * (0.25 * bounds_ws.size().y).min(0.5 * (bounds_ws.max.y - eye_ws.y).max(0.0));
     let place = |a: f32, side: f32, rise: f32| eye_ws + along_ws * a + side_ws * side + rise_ws * rise;
     let key = |eye: Vec3, target: Vec3| Keyframe {
-        eye_ws: eye.into(),
-        target_ws: target.into(),
+        eye_ws: eye.as_dvec3().into(),
+        target_ws: target.as_dvec3().into(),
         fov_deg: INTERIOR_FOV_DEG,
     };
     vec![
@@ -436,8 +451,8 @@ fn orbit(center_ws: Vec3, eye_ws: Vec3) -> Vec<Keyframe> {
         .map(|i| {
             let turned = glam::Quat::from_rotation_y(f32::from(i) * std::f32::consts::FRAC_PI_4) * arm;
             Keyframe {
-                eye_ws: (center_ws + turned).into(),
-                target_ws: center_ws.into(),
+                eye_ws: (center_ws + turned).as_dvec3().into(),
+                target_ws: center_ws.as_dvec3().into(),
                 fov_deg: EXTERIOR_FOV_DEG,
             }
         })
@@ -445,8 +460,7 @@ fn orbit(center_ws: Vec3, eye_ws: Vec3) -> Vec<Keyframe> {
 }
 
 /// The uniform Catmull-Rom spline between the middle two of four points (Catmull, Rom 1974).
-fn catmull_rom(points: [Vec3; 4], u: f32) -> Vec3 {
-    let [p0, p1, p2, p3] = points.map(|p| p.as_dvec3());
+fn catmull_rom([p0, p1, p2, p3]: [DVec3; 4], u: f32) -> Vec3 {
     let u = f64::from(u);
     let sum: DVec3 = 2.0 * p1
         + (p2 - p0) * u

@@ -14,6 +14,7 @@ mod load;
 mod model;
 mod mtl;
 mod obj;
+mod origin;
 pub mod points;
 pub mod rng;
 mod tangent;

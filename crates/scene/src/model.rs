@@ -1,12 +1,12 @@
 //! The scene in memory: what every loader produces and every renderer uploads.
 //!
 //! Spaces: object space (`_os`) of one mesh, world space (`_ws`, metres, right-handed, +Y up as in
-//! glTF). Colours are linear Rec. 709 unless a name says sRGB. Triangles are counter-clockwise
+//! glTF), relative to [`Scene::origin_file`] in the coordinates of the file. Colours are linear Rec. 709 unless a name says sRGB. Triangles are counter-clockwise
 //! seen from their front.
 
 use std::{path::PathBuf, sync::Arc};
 
-use glam::{Affine3A, Mat4, Vec2, Vec3};
+use glam::{Affine3A, DAffine3, DMat4, DVec3, DVec4, Mat4, Vec2, Vec3};
 
 use crate::tangent;
 
@@ -281,8 +281,8 @@ pub struct Node {
     pub name: String,
     /// Index of the parent; parents precede children.
     pub parent: Option<u32>,
-    /// Parent from node, at rest.
-    pub local: Affine3A,
+    /// Parent from node, at rest; the parent of a root is the space of the file.
+    pub local: DAffine3,
 }
 
 /// A scene.
@@ -290,6 +290,9 @@ pub struct Node {
 pub struct Scene {
     /// Name for reports.
     pub name: String,
+    /// Where the origin of world space is in the coordinates of the file, metres: zero, or beside a scene that lies far from
+    /// its file's origin. Instances, lights and cameras are relative to it.
+    pub origin_file: DVec3,
     /// Vertex positions in object space, all meshes one after another.
     pub positions_os: Vec<[f32; 3]>,
     /// The other attributes, as many as positions.
@@ -422,33 +425,81 @@ impl Aabb {
 impl Camera {
     /// World to view.
     pub fn view_from_world(&self) -> Mat4 {
-        Mat4::from(self.world_from_view.inverse())
+        DMat4::from(self.world_from_view.as_daffine3().inverse()).as_mat4()
     }
 
     /// View to clip, for an image of `aspect` = width / height. Reversed depth, y down as in Vulkan.
     pub fn clip_from_view(&self, aspect: f32) -> Mat4 {
-        use glam::Vec4;
+        self.exact_clip_from_view(aspect).as_mat4()
+    }
+
+    /// World to clip, for an image of `aspect` = width / height. Multiplied in 64 bits, rounded once: the eye may be far from
+    /// what it sees.
+    pub fn clip_from_world(&self, aspect: f32) -> Mat4 {
+        let view_from_world = DMat4::from(self.world_from_view.as_daffine3().inverse());
+        (self.exact_clip_from_view(aspect) * view_from_world).as_mat4()
+    }
+
+    fn exact_clip_from_view(&self, aspect: f32) -> DMat4 {
+        let aspect = f64::from(aspect);
         match self.projection {
             Projection::Perspective { fov_y_rad, near_m } => {
-                let f = 1.0 / (0.5 * fov_y_rad).tan();
-                Mat4::from_cols(
-                    Vec4::new(f / aspect, 0.0, 0.0, 0.0),
-                    Vec4::new(0.0, -f, 0.0, 0.0),
-                    Vec4::new(0.0, 0.0, 0.0, -1.0),
-                    Vec4::new(0.0, 0.0, near_m, 0.0),
+                let f = 1.0 / (0.5 * f64::from(fov_y_rad)).tan();
+                DMat4::from_cols(
+                    DVec4::new(f / aspect, 0.0, 0.0, 0.0),
+                    DVec4::new(0.0, -f, 0.0, 0.0),
+                    DVec4::new(0.0, 0.0, 0.0, -1.0),
+                    DVec4::new(0.0, 0.0, near_m.into(), 0.0),
                 )
             }
             Projection::Orthographic { half_height_m, near_m, far_m } => {
                 // depth = (z_view + far) / (far - near), with z_view from -near (1) to -far (0)
+                let [half_height_m, near_m, far_m] = [half_height_m, near_m, far_m].map(f64::from);
                 let depth = far_m - near_m;
-                Mat4::from_cols(
-                    Vec4::new(1.0 / (half_height_m * aspect), 0.0, 0.0, 0.0),
-                    Vec4::new(0.0, -1.0 / half_height_m, 0.0, 0.0),
-                    Vec4::new(0.0, 0.0, 1.0 / depth, 0.0),
-                    Vec4::new(0.0, 0.0, far_m / depth, 1.0),
+                DMat4::from_cols(
+                    DVec4::new(1.0 / (half_height_m * aspect), 0.0, 0.0, 0.0),
+                    DVec4::new(0.0, -1.0 / half_height_m, 0.0, 0.0),
+                    DVec4::new(0.0, 0.0, 1.0 / depth, 0.0),
+                    DVec4::new(0.0, 0.0, far_m / depth, 1.0),
                 )
             }
         }
+    }
+
+    /// The same view with the planes of an orthographic camera as near as a box of the scene lets them be: depths there are at
+    /// even steps, of which a far plane of 10^6 m would leave but one every 0.06 m. The planes move inwards alone, so that what
+    /// they cut away stays away. An eye that is far from the box besides moves towards it, since view distances have 32 bits as
+    /// well; returns by how much, metres, too. A perspective camera stays as it is: its steps are finer the nearer a surface is.
+    pub fn fitted(&self, bounds_ws: &Aabb) -> (Self, f32) {
+        /// Part of the box's extent that is kept free before and behind it, and part of where it is: rounding cuts nothing.
+        const MARGIN: f64 = 0.01;
+        const ROUNDING: f64 = 1e-5;
+        /// Depths of the box that the eye may be away from it.
+        const FAR_DEPTHS: f64 = 64.0;
+        let stays = (self.clone(), 0.0);
+        let Projection::Orthographic { half_height_m, near_m, far_m } = self.projection else { return stays };
+        let forward = -self.world_from_view.matrix3.z_axis.as_dvec3();
+        let (min, max) = (bounds_ws.min.as_dvec3(), bounds_ws.max.as_dvec3());
+        let center_m = forward.dot(0.5 * (min + max) - self.eye_ws().as_dvec3());
+        let half_m = 0.5 * forward.abs().dot(max - min);
+        let margin_m = MARGIN * (max - min).max_element() + ROUNDING * min.abs().max(max.abs()).max_element();
+        let nearest_m = (center_m - half_m - margin_m).max(near_m.into());
+        let farthest_m = (center_m + half_m + margin_m).min(far_m.into());
+        let depth_m = farthest_m - nearest_m;
+        // Nothing of the box is between the planes, or it is empty or not finite.
+        if bounds_ws.is_empty() || !(depth_m > 0.0 && depth_m.is_finite()) {
+            return stays;
+        }
+        let moved_m = if nearest_m > FAR_DEPTHS * depth_m { (nearest_m - depth_m) as f32 } else { 0.0 };
+        let [near_m, far_m] = [nearest_m, farthest_m].map(|m| (m - f64::from(moved_m)) as f32);
+        if near_m >= far_m {
+            return stays;
+        }
+        let mut camera = self.clone();
+        camera.projection = Projection::Orthographic { half_height_m, near_m, far_m };
+        let eye_ws = self.eye_ws().as_dvec3() + forward * f64::from(moved_m);
+        camera.world_from_view.translation = eye_ws.as_vec3().into();
+        (camera, moved_m)
     }
 
     /// Position of the eye in world space.
@@ -471,6 +522,16 @@ impl Camera {
 }
 
 impl Scene {
+    /// A point in the coordinates of the file, metres: what people read and write.
+    pub fn file_from_world(&self, point_ws: Vec3) -> DVec3 {
+        self.origin_file + point_ws.as_dvec3()
+    }
+
+    /// A point of the file's coordinates in world space, metres.
+    pub fn world_from_file(&self, point_file: DVec3) -> Vec3 {
+        (point_file - self.origin_file).as_vec3()
+    }
+
     /// Bounds in world space: each instance's own box, transformed by its eight corners.
     pub fn bounds_ws(&self) -> Aabb {
         self.instances.iter().fold(Aabb::EMPTY, |b, i| {

@@ -6,14 +6,14 @@ use std::{
     path::Path,
 };
 
-use glam::{Affine3A, Vec2, Vec3, Vec4};
+use glam::{Affine3A, DAffine3, Vec2, Vec3, Vec4};
 
 use crate::{
     Aabb, AlphaMode, Image, ImageData, Instance, Material, Mesh, Node, Sampler, Scene, SceneError,
     TextureRef, VertexAttributes,
     load::read_file,
     mtl::{self, MtlMaterial},
-    tangent, texture,
+    origin, tangent, texture,
 };
 
 /// Loads an `.obj` from its bytes; `file` names it and gives the folder of materials and textures.
@@ -27,12 +27,13 @@ fn load_with(
     bytes: &[u8],
     read_library: &dyn Fn(&Path) -> Result<Vec<u8>, SceneError>,
 ) -> Result<Scene, SceneError> {
-    let mut scene = Scene::default();
     check_indices(file, bytes)?;
+    let (bytes, origin_file) = origin::obj_near_its_origin(bytes);
+    let mut scene = Scene { origin_file, ..Scene::default() };
     let options =
         tobj::LoadOptions { single_index: true, triangulate: true, ignore_points: true, ignore_lines: true };
     let libraries = RefCell::new(Libraries { file, read: read_library, materials: vec![], warnings: vec![] });
-    let parsed = tobj::load_obj_buf(&mut BufReader::new(Cursor::new(bytes)), &options, |name| {
+    let parsed = tobj::load_obj_buf(&mut BufReader::new(Cursor::new(&bytes[..])), &options, |name| {
         libraries.borrow_mut().add(name)
     });
     let (models, _) = parsed.map_err(|e| SceneError::invalid(file, "OBJ", e.to_string(), "Wavefront OBJ"))?;
@@ -283,7 +284,8 @@ fn add_mesh(file: &Path, model: &tobj::Model, material: u32, scene: &mut Scene) 
     let mut bounds_os = Aabb::EMPTY;
     positions_os.iter().for_each(|&p| bounds_os.extend(p.into()));
     let node = scene.nodes.len() as u32;
-    scene.nodes.push(Node { name: name.clone(), parent: None, local: Affine3A::IDENTITY });
+    let local = DAffine3::from_translation(scene.origin_file);
+    scene.nodes.push(Node { name: name.clone(), parent: None, local });
     scene.instances.push(Instance {
         mesh: scene.meshes.len() as u32,
         node,

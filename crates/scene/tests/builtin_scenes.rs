@@ -264,7 +264,7 @@ fn camera_paths_pass_through_their_keyframes() {
     let path = camera::CameraPath::from_json(text, file).expect("a path");
     for (i, key) in path.keyframes.iter().enumerate() {
         let camera = path.at(i as f32 / 2.0);
-        assert!(camera.eye_ws().abs_diff_eq(Vec3::from_array(key.eye_ws), 1e-5));
+        assert!(camera.eye_ws().abs_diff_eq(glam::DVec3::from_array(key.eye_ws).as_vec3(), 1e-5));
     }
     for bad in [
         "",

@@ -4,9 +4,12 @@ mod common;
 
 use afterlight_stages::lights::step::asked;
 use afterlight_techniques::{
-    Params, Settings, Shadows, Technique, Transparency, find, graph::gpu, registry, scene::Camera,
+    Params, Settings, Shadows, Technique, Transparency, find,
+    graph::gpu,
+    registry,
+    scene::{AlphaMode, Camera},
 };
-use common::{Stage, image_of, least_db, params, psnr};
+use common::{Stage, covered, image_of, least_db, params, psnr};
 use glam::Vec3;
 
 /// Least PSNR to `forward` at as many samples, dB (contract).
@@ -413,5 +416,31 @@ fn weights_that_do_not_sum_are_seen() {
         let settings = Settings { samples, view: "weights".to_owned(), ..stage.settings((161, 91), 2) };
         let off = pixels_not_black(&list_image(&stage, &settings, &[("fill", "raster"), ("blocks", "0")]));
         assert!(off > 20, "{off} pixels are seen to lack samples");
+    }
+}
+
+/// Bands that masked surfaces, or any, do not reach: the passes over them write the same buffers, and the image is that of one band.
+#[test]
+fn bands_that_nothing_reaches_are_drawn_too() {
+    let gpu = afterlight_testkit::gpu();
+    let technique = find("dais-list").unwrap();
+    let loaded = Stage::new(&gpu, "builtin:intersect").scene;
+    for masked in 0..loaded.materials.len() {
+        let mut scene = loaded.clone();
+        scene.materials[masked].alpha_mode = AlphaMode::Mask { cutoff: 0.5 };
+        let stage = Stage::of(&gpu, scene);
+        // Low over the floor and upwards: the sky alone in the upper band, the floor alone in the lowest.
+        let bounds = stage.scene.bounds_ws();
+        let eye = bounds.center() + bounds.size() * Vec3::new(0.9, 0.4, 0.9);
+        let camera = Camera::look_at("up", eye, bounds.center() + bounds.size() * Vec3::Y * 0.8, 1.2, 0.1);
+        let settings = Settings { samples: 4, ..stage.from(camera, (96, 96), 4) };
+        let [one, six] = ["1", "6"].map(|bands| {
+            let params = params(technique, &[("bands", bands)]);
+            image_of(&mut stage.prepare_with(technique, &settings, &params))
+        });
+        assert!(covered(&one) > 0.05, "the view shows {:.3}", covered(&one));
+        let db = psnr(&one, &six);
+        println!("material {masked}: {db:.2} dB");
+        assert!(db > 60.0, "material {masked} masked: {db:.2} dB to one band");
     }
 }

@@ -95,7 +95,7 @@ impl View {
         let camera = Camera::look_at("test", eye, eye + Vec3::new(-0.6, 0.3, -0.8), 1.1, 0.1);
         let aspect = SIZE_PX.0 as f32 / SIZE_PX.1 as f32;
         // What the device is given: screen positions are defined by it.
-        let clip_from_world = (camera.clip_from_view(aspect) * camera.view_from_world()).as_dmat4();
+        let clip_from_world = camera.clip_from_world(aspect).as_dmat4();
         let half_height = (0.55f64).tan();
         Self {
             world_from_view: camera.view_from_world().as_dmat4().inverse(),

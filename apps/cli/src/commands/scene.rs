@@ -68,7 +68,7 @@ fn scene_json(source: &str, scene: &Scene) -> Value {
         .iter()
         .enumerate()
         .map(|(index, camera)| {
-            let eye = camera.eye_ws();
+            let eye = scene.file_from_world(camera.eye_ws());
             let projection = match camera.projection {
                 Projection::Perspective { fov_y_rad, near_m } => {
                     json!({ "kind": "perspective", "fov_y_deg": fov_y_rad.to_degrees(), "near_m": near_m })
@@ -80,7 +80,10 @@ fn scene_json(source: &str, scene: &Scene) -> Value {
             json!({ "index": index, "name": camera.name, "eye_ws": [eye.x, eye.y, eye.z], "projection": projection })
         })
         .collect();
-    let corner = |v: [f32; 3]| if bounds.is_empty() { Value::Null } else { json!(v) };
+    let corner = |corner_ws| match bounds.is_empty() {
+        true => Value::Null,
+        false => json!(scene.file_from_world(corner_ws).to_array()),
+    };
     json!({
         "schema": 1,
         "source": source,
@@ -99,7 +102,7 @@ fn scene_json(source: &str, scene: &Scene) -> Value {
         "lights": { "point": points, "spot": spots, "directional": directionals },
         "cameras": cameras,
         "animations": scene.animations.len(),
-        "bounds_ws": { "min": corner(bounds.min.to_array()), "max": corner(bounds.max.to_array()) },
+        "bounds_ws": { "min": corner(bounds.min), "max": corner(bounds.max) },
         "memory": { "geometry_bytes": memory.geometry_bytes, "texture_bytes": memory.texture_bytes },
         "warnings": scene.warnings,
     })
@@ -120,13 +123,13 @@ fn scene_text(scene: &Scene) -> String {
     line("textures", scene.images.len().to_string());
     line("lights", format!("{points} point, {spots} spot, {directionals} directional"));
     for (index, camera) in scene.cameras.iter().enumerate() {
-        let eye = camera.eye_ws();
+        let eye = scene.file_from_world(camera.eye_ws());
         line("camera", format!("{index} '{}' at {:.2}, {:.2}, {:.2} m", camera.name, eye.x, eye.y, eye.z));
     }
     if !scene.animations.is_empty() {
         line("animations", scene.animations.len().to_string());
     }
-    let (min, max) = (bounds.min, bounds.max);
+    let [min, max] = [bounds.min, bounds.max].map(|corner| scene.file_from_world(corner));
     line(
         "bounds",
         if bounds.is_empty() {

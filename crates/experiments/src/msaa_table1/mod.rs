@@ -418,7 +418,7 @@ fn list_note(is_papers: bool, depth_bytes: u64, blocks: Blocks) -> String {
         }
         (true, 4) => "blocks of 112 bits, depth and stencil 4 bytes a sample".to_owned(),
         (true, _) => format!(
-            "blocks of 112 bits; the device has no depth with stencil in 4 bytes, a sample takes {depth_bytes}: the 4 of depth are compared"
+            "blocks of 112 bits; float depth with stencil takes {depth_bytes} bytes a sample: the 4 of depth are compared"
         ),
         (false, _) => {
             "blocks of 144 bits (with the sample's distance); visibility is depth and triangle ID, 4 bytes each a sample, or where compute rasterises keys of 8 that hold both, and queues".to_owned()
@@ -426,10 +426,9 @@ fn list_note(is_papers: bool, depth_bytes: u64, blocks: Blocks) -> String {
     }
 }
 
-/// Bytes that a sample of the smallest depth with stencil takes on the device: 24 + 8 bits, or 32 + 8 padded to 64.
+/// Bytes that a sample of depth with stencil takes on the device: 32 + 8 bits padded to 64, or 24 + 8.
 fn stencil_depth_bytes(base: &Renderer) -> u64 {
-    let wanted = vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT | vk::FormatFeatureFlags::SAMPLED_IMAGE;
-    if base.device().format_supports(vk::Format::D24_UNORM_S8_UINT, wanted) { 4 } else { 8 }
+    if base.device().depth_stencil_format() == vk::Format::D24_UNORM_S8_UINT { 4 } else { 8 }
 }
 
 /// Allocates the images of `deferred-ssaa` at one sample, which the technique does not render, and returns their bytes.

@@ -53,6 +53,11 @@ pub struct Ordered {
 }
 
 impl Blended {
+    /// Box of all of them.
+    pub fn bounds_ws(&self) -> Aabb {
+        self.draws.iter().fold(Aabb::EMPTY, |bounds, draw| bounds.union(&draw.bounds_ws))
+    }
+
     /// Of draws given by their records and bounds; the first has the number `first_number`. `indices` are those that the
     /// draws refer to.
     pub fn new(

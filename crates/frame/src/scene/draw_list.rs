@@ -1,5 +1,7 @@
 //! Which draws a view needs, in which order: frustum culling and sorting on the CPU, written as indirect commands.
 
+use std::ops::Range;
+
 use afterlight_graph::gpu::{self, vk};
 use afterlight_scene::Aabb;
 use glam::{Mat4, Vec3, Vec4};
@@ -145,12 +147,42 @@ impl Frustum {
     /// Whether a box may be in view: false only where it lies outside one half-space as a whole. Boxes with a bound
     /// that is no number are kept.
     pub fn touches(&self, bounds: &Aabb) -> bool {
-        !self.0.iter().any(|plane| {
-            let n = plane.truncate();
-            let farthest = Vec3::select(n.cmpge(Vec3::ZERO), bounds.max, bounds.min);
-            n.dot(farthest) + plane.w < 0.0
-        })
+        touches(&self.0, bounds)
     }
+}
+
+/// Some rows of the image, as half-spaces above and below them; the image's own upper and lower bound bound nothing.
+pub struct Rows(Vec<Vec4>);
+
+impl Rows {
+    /// Rows of an image `height_px` high, with one more to each side than rounding can move a bound.
+    pub fn new(clip_from_world: Mat4, rows: Range<u32>, height_px: u32) -> Self {
+        let (y, w) = (clip_from_world.row(1), clip_from_world.row(3));
+        let ndc = |row: f32| 2.0 * row / height_px as f32 - 1.0;
+        let mut planes = Vec::new();
+        if rows.start > 0 {
+            planes.push(y - w * ndc(rows.start as f32 - 1.0));
+        }
+        if rows.end < height_px {
+            planes.push(w * ndc(rows.end as f32 + 1.0) - y);
+        }
+        Self(planes)
+    }
+
+    /// Whether a box may reach the rows.
+    pub fn touch(&self, bounds: &Aabb) -> bool {
+        touches(&self.0, bounds)
+    }
+}
+
+/// Whether a box may lie within half-spaces: false only where it lies outside one of them as a whole. Boxes with a bound that is no
+/// number are kept.
+fn touches(planes: &[Vec4], bounds: &Aabb) -> bool {
+    !planes.iter().any(|plane| {
+        let n = plane.truncate();
+        let farthest = Vec3::select(n.cmpge(Vec3::ZERO), bounds.max, bounds.min);
+        n.dot(farthest) + plane.w < 0.0
+    })
 }
 
 #[cfg(test)]
@@ -174,6 +206,30 @@ mod tests {
             });
             prop_assert!(!seen || Frustum::new(clip).touches(&bounds));
         }
+
+        /// Every corner that is seen is in rows that its box is said to reach.
+        #[test]
+        fn boxes_are_kept_in_the_rows_that_they_reach(c in prop::array::uniform3(-20f32..20.0), s in prop::array::uniform3(0f32..5.0)) {
+            let clip = Camera::look_at("c", Vec3::new(1.0, 2.0, 9.0), Vec3::ZERO, 1.0, 0.1).clip_from_world(1.5);
+            let bounds = Aabb { min: Vec3::from(c) - Vec3::from(s), max: Vec3::from(c) + Vec3::from(s) };
+            for corner in [bounds.min, bounds.max, bounds.center()] {
+                let q = clip * corner.extend(1.0);
+                let row = (q.y / q.w * 0.5 + 0.5) * 64.0;
+                if q.w > 0.0 && (0.0..64.0).contains(&row) {
+                    let band = row as u32 / 16 * 16;
+                    prop_assert!(Rows::new(clip, band..band + 16, 64).touch(&bounds), "{corner} in row {row}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_box_above_rows_is_not_in_them() {
+        let clip = Camera::look_at("c", Vec3::ZERO, Vec3::NEG_Z, 1.0, 0.1).clip_from_world(1.0);
+        let bounds = Aabb { min: Vec3::new(-1.0, 0.5, -4.0), max: Vec3::new(1.0, 1.0, -3.0) };
+        let reaches = |rows| Rows::new(clip, rows, 64).touch(&bounds);
+        assert_eq!([0..16, 16..32, 32..48, 48..64].map(reaches), [true, true, false, false]);
+        assert!(reaches(0..64));
     }
 
     #[test]

@@ -150,6 +150,11 @@ impl SceneGpu {
         displaced(&bounds, displacement_m)
     }
 
+    /// The same of all surfaces, those with alpha blending too.
+    pub fn all_bounds_ws(&self, displacement_m: f32) -> Aabb {
+        self.bounds_ws(displacement_m).union(&displaced(&self.blended.bounds_ws(), displacement_m))
+    }
+
     /// Number of draws without alpha blending: pieces of at most 1,024 triangles.
     pub fn draw_count(&self) -> usize {
         self.draw_infos.len()

@@ -4,7 +4,7 @@ use afterlight_scene::points::{SurfacePoint, surface_points};
 use afterlight_scene::rng::SplitMix64;
 use afterlight_scene::{Scene, camera};
 use afterlight_techniques::{Effects, Indirect, Shadows, Transparency};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use crate::FrameSpec;
 
@@ -77,6 +77,8 @@ pub struct Stage {
     /// Greatest extent, positive, metres.
     extent_m: f32,
     cameras: u32,
+    /// Where world space has its origin, in the coordinates of the scene's file.
+    origin_file: DVec3,
 }
 
 impl Stage {
@@ -94,7 +96,17 @@ impl Stage {
             size_m,
             extent_m: size_m.max_element(),
             cameras: scene.cameras.len() as u32,
+            origin_file: scene.origin_file,
         }
+    }
+
+    /// A point in the coordinates of the scene's file, as `--camera` has it: digits that give the same point again.
+    fn point_text(&self, point_ws: Vec3) -> String {
+        if self.origin_file == DVec3::ZERO {
+            return format!("{},{},{}", point_ws.x, point_ws.y, point_ws.z);
+        }
+        let point = self.origin_file + point_ws.as_dvec3();
+        format!("{},{},{}", point.x, point.y, point.z)
     }
 
     /// A point of a surface; the middle of the bounds where there is no surface.
@@ -213,7 +225,7 @@ fn draw_camera(stage: &Stage, rng: &mut SplitMix64) -> (Place, String) {
     // As far as the scene is wide: rounding of the target then turns the view by less than a thousandth of a pixel.
     let target_ws = eye_ws
         + direction.try_normalize().unwrap_or(Vec3::NEG_Z) * stage.extent_m.max(1e-3 * eye_ws.length());
-    let pose = [eye_ws, target_ws].map(|p| format!("{},{},{}", p.x, p.y, p.z)).join(",");
+    let pose = [eye_ws, target_ws].map(|point| stage.point_text(point)).join(",");
     (place, format!("{pose},{}", draw_lens(stage, rng)))
 }
 

@@ -309,7 +309,7 @@ impl SceneBuilder {
 
     /// Adds a node; its index.
     pub fn node(&mut self, name: &str, parent: Option<u32>, local: Affine3A) -> u32 {
-        self.scene.nodes.push(Node { name: name.to_owned(), parent, local });
+        self.scene.nodes.push(Node { name: name.to_owned(), parent, local: local.as_daffine3() });
         self.scene.nodes.len() as u32 - 1
     }
 

@@ -319,7 +319,7 @@ pub(super) fn moving(segments: u32) -> Scene {
     let scaler = b.place("scaler", cube, Affine3A::from_translation(Vec3::new(3.0, -0.2, -1.0)));
     let local = Affine3A::from_scale_rotation_translation(Vec3::splat(0.4), Quat::IDENTITY, Vec3::X * 1.7);
     let swinger = b.node("swinger", Some(spinner), local);
-    let world_from_object = b.scene.nodes[spinner as usize].local * local;
+    let world_from_object = (b.scene.nodes[spinner as usize].local * local.as_daffine3()).as_affine3a();
     b.scene.instances.push(crate::Instance { mesh: cube, node: swinger, world_from_object });
 
     b.scene.animations = vec![Animation {
@@ -347,7 +347,7 @@ pub(super) fn moving(segments: u32) -> Scene {
 }
 
 fn track(node: u32, rest_translation: Vec3, rest_scale: Vec3) -> NodeTrack {
-    NodeTrack { node, rest_translation, rest_scale, ..NodeTrack::default() }
+    NodeTrack { node, rest_translation: rest_translation.as_dvec3(), rest_scale, ..NodeTrack::default() }
 }
 
 /// To the right and back.

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use gltf::json::{self, Root, Value};
 
+use super::node::Places;
 use crate::SceneError;
 
 /// Extensions that are understood in full, so that a file may require them.
@@ -20,6 +21,8 @@ const SUPPORTED: &[&str] = &[
 /// The JSON and the binary chunk of a file.
 pub(super) struct Container<'a> {
     pub(super) root: Root,
+    /// Where nodes are, in 64 bits.
+    pub(super) places: Places,
     /// The BIN chunk; `None` in a `.gltf` or where the GLB has none.
     pub(super) bin: Option<&'a [u8]>,
     pub(super) is_glb: bool,
@@ -35,7 +38,8 @@ pub(super) fn parse<'a>(file: &Path, bytes: &'a [u8]) -> Result<Container<'a>, S
     let mut warnings = Vec::new();
     check_version(file, &root)?;
     check_extensions(file, &root, &mut warnings)?;
-    Ok(Container { root, bin, is_glb, warnings })
+    let places = Places::read(&root, json);
+    Ok(Container { root, places, bin, is_glb, warnings })
 }
 
 const CHUNK_JSON: u32 = 0x4E4F_534A;

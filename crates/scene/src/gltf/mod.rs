@@ -31,13 +31,13 @@ pub(crate) fn load(file: &Path, bytes: &[u8], options: &LoadOptions) -> Result<S
     let materials = material::convert(&accessors, root, &mut scene.warnings)?;
     scene.materials = materials.materials;
     scene.images = materials.images;
-    let placement = node::place(file, root, &mut scene)?;
+    let placement = node::place(file, root, container.places, &mut scene)?;
     scene.animations = motion::convert(&accessors, root, &placement, &mut scene.warnings)?;
     let draws = node::find_draws(&accessors, root, &placement, &mut scene)?;
     let meshes = mesh::convert(&accessors, root, &draws.variants, &mut scene)?;
     mesh::check_unused(&accessors, root, &draws.variants)?;
+    node::make_instances(file, &draws, &meshes, options.time_s, &mut scene)?;
     let worlds = scene.world_from_nodes(options.time_s);
-    node::make_instances(file, &draws, &meshes, &worlds, &mut scene)?;
     node::make_lights_and_cameras(file, root, &placement, &worlds, &mut scene)?;
     Ok(scene)
 }

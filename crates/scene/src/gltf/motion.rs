@@ -67,12 +67,12 @@ fn convert_one(
             return Err(invalid("a node with a matrix", "a node with translation, rotation and scale"));
         }
         let Some(node) = placement.scene_node[target] else { continue };
-        let rest = rest_trs(accessors.file, root, target)?;
+        let rest = rest_trs(accessors.file, root, &placement.places, target)?;
         let track = tracks.entry(node).or_insert_with(|| NodeTrack {
             node,
             rest_translation: rest.translation,
-            rest_rotation: rest.rotation,
-            rest_scale: rest.scale,
+            rest_rotation: rest.rotation.as_quat(),
+            rest_scale: rest.scale.as_vec3(),
             ..NodeTrack::default()
         });
         let output = sampler.output.value();

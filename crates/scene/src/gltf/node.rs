@@ -2,7 +2,7 @@
 
 use std::{collections::HashMap, path::Path};
 
-use glam::{Affine3A, Mat4, Quat, Vec3};
+use glam::{Affine3A, DAffine3, DMat4, DQuat, DVec3, Mat4, Vec3};
 use gltf::json::{
     self, Root,
     camera::Type as CameraType,
@@ -11,8 +11,10 @@ use gltf::json::{
     validation::Checked,
 };
 
+use serde::Deserialize;
+
 use super::{accessor::Accessors, check, mesh::Variant};
-use crate::{Camera, Instance, Light, LightKind, Node, Projection, Scene, SceneError};
+use crate::{Camera, Instance, Light, LightKind, Node, Projection, Scene, SceneError, animation};
 
 /// Most nodes and most draws of a scene: instancing lets a short file ask for many.
 const INSTANCE_COUNT_MAX: u64 = 1 << 22;
@@ -20,14 +22,60 @@ const INSTANCE_COUNT_MAX: u64 = 1 << 22;
 /// Translation, rotation and scale.
 #[derive(Clone, Copy)]
 pub(super) struct Trs {
-    pub(super) translation: Vec3,
-    pub(super) rotation: Quat,
-    pub(super) scale: Vec3,
+    pub(super) translation: DVec3,
+    pub(super) rotation: DQuat,
+    pub(super) scale: DVec3,
 }
 
 impl Trs {
-    fn local(&self) -> Affine3A {
-        Affine3A::from_scale_rotation_translation(self.scale, self.rotation, self.translation)
+    fn local(&self) -> DAffine3 {
+        animation::local(self.scale, self.rotation, self.translation)
+    }
+}
+
+/// Transforms of the file's nodes in 64 bits: the typed document rounds them to 32.
+#[derive(Default)]
+pub(super) struct Places {
+    /// A place a node; none where no node is far from its parent.
+    nodes: Vec<Place>,
+}
+
+#[derive(Clone, Copy, Default, Deserialize)]
+struct Place {
+    translation: Option<[f64; 3]>,
+    rotation: Option<[f64; 4]>,
+    scale: Option<[f64; 3]>,
+    matrix: Option<[f64; 16]>,
+}
+
+impl Places {
+    /// Reads them from the JSON where a node is so far from its parent that rounding would show.
+    pub(super) fn read(root: &Root, json: &[u8]) -> Self {
+        #[derive(Deserialize)]
+        struct Nodes {
+            nodes: Vec<Place>,
+        }
+        // Up to here 32 bits are at most 4 µm off.
+        const NEAR_M: f32 = 64.0;
+        let offset = |node: &json::Node| node.translation.or(node.matrix.map(|m| [m[12], m[13], m[14]]));
+        let is_far = |node: &json::Node| offset(node).is_some_and(|t| t.iter().any(|v| v.abs() > NEAR_M));
+        if !root.nodes.iter().any(is_far) {
+            return Self::default();
+        }
+        // The document has been read once: what fails here fails by rules that are stricter than glTF's, and keeps 32 bits.
+        serde_json::from_slice::<Nodes>(json)
+            .map_or_else(|_| Self::default(), |all| Self { nodes: all.nodes })
+    }
+
+    /// The transform of a node, as exact as it is known.
+    fn of(&self, root: &Root, index: usize) -> Place {
+        let node = &root.nodes[index];
+        self.nodes.get(index).copied().unwrap_or_else(|| Place {
+            translation: node.translation.map(|t| t.map(f64::from)),
+            rotation: node.rotation.map(|q| q.0.map(f64::from)),
+            scale: node.scale.map(|s| s.map(f64::from)),
+            matrix: node.matrix.map(|m| m.map(f64::from)),
+        })
     }
 }
 
@@ -37,6 +85,8 @@ pub(super) struct Placement {
     pub(super) scene_node: Vec<Option<u32>>,
     /// glTF nodes of the scene in the scene's order.
     pub(super) order: Vec<usize>,
+    /// Translations of the glTF nodes.
+    pub(super) places: Places,
 }
 
 /// One place of a mesh: the scene's node and the variant drawn there.
@@ -46,15 +96,15 @@ struct Draw {
 }
 
 /// The rest pose of a node as translation, rotation and scale.
-pub(super) fn rest_trs(file: &Path, root: &Root, index: usize) -> Result<Trs, SceneError> {
-    let node = &root.nodes[index];
-    let q = node.rotation.map_or(Quat::IDENTITY, |r| Quat::from_array(r.0));
+pub(super) fn rest_trs(file: &Path, root: &Root, places: &Places, index: usize) -> Result<Trs, SceneError> {
+    let place = places.of(root, index);
     let trs = Trs {
-        translation: node.translation.map_or(Vec3::ZERO, Vec3::from),
-        rotation: if q.length_squared() > 0.0 { q.normalize() } else { Quat::IDENTITY },
-        scale: node.scale.map_or(Vec3::ONE, Vec3::from),
+        translation: place.translation.map_or(DVec3::ZERO, DVec3::from_array),
+        rotation: animation::unit(place.rotation.map_or(DQuat::IDENTITY, DQuat::from_array)),
+        scale: place.scale.map_or(DVec3::ONE, DVec3::from_array),
     };
-    if !(trs.translation.is_finite() && trs.rotation.is_finite() && trs.scale.is_finite()) {
+    let finite = trs.translation.as_vec3().is_finite() && trs.scale.as_vec3().is_finite();
+    if !(finite && trs.rotation.as_quat().is_finite()) {
         return Err(SceneError::invalid(
             file,
             format!("nodes[{index}]"),
@@ -65,21 +115,29 @@ pub(super) fn rest_trs(file: &Path, root: &Root, index: usize) -> Result<Trs, Sc
     Ok(trs)
 }
 
-fn local(file: &Path, root: &Root, index: usize) -> Result<Affine3A, SceneError> {
-    let Some(m) = root.nodes[index].matrix else { return Ok(rest_trs(file, root, index)?.local()) };
+fn local(file: &Path, root: &Root, places: &Places, index: usize) -> Result<DAffine3, SceneError> {
+    let Some(m) = places.of(root, index).matrix else {
+        return Ok(rest_trs(file, root, places, index)?.local());
+    };
     let at = || format!("nodes[{index}].matrix");
-    if !m.iter().all(|v| v.is_finite()) {
+    if !m.iter().all(|v| (*v as f32).is_finite()) {
         return Err(SceneError::invalid(file, at(), "numbers that overflow", "finite numbers"));
     }
-    if [m[3], m[7], m[11], m[15]] != [0.0, 0.0, 0.0, 1.0] {
-        let found = format!("the last row {:?}", [m[3], m[7], m[11], m[15]]);
+    let last_row = [m[3], m[7], m[11], m[15]].map(|v| v as f32);
+    if last_row != [0.0, 0.0, 0.0, 1.0] {
+        let found = format!("the last row {last_row:?}");
         return Err(SceneError::invalid(file, at(), found, "0, 0, 0, 1"));
     }
-    Ok(Affine3A::from_mat4(Mat4::from_cols_array(&m)))
+    Ok(DAffine3::from_mat4(DMat4::from_cols_array(&m)))
 }
 
 /// Puts the nodes of the default scene (else the first, else all roots) into `scene`.
-pub(super) fn place(file: &Path, root: &Root, scene: &mut Scene) -> Result<Placement, SceneError> {
+pub(super) fn place(
+    file: &Path,
+    root: &Root,
+    places: Places,
+    scene: &mut Scene,
+) -> Result<Placement, SceneError> {
     let chosen = root.scene.map(|s| s.value()).or((!root.scenes.is_empty()).then_some(0));
     let roots: Vec<usize> = match chosen {
         Some(s) => root.scenes[s].nodes.iter().map(|n| n.value()).collect(),
@@ -92,13 +150,13 @@ pub(super) fn place(file: &Path, root: &Root, scene: &mut Scene) -> Result<Place
             (0..root.nodes.len()).filter(|&n| !is_child[n]).collect()
         }
     };
-    let mut placement = Placement { scene_node: vec![None; root.nodes.len()], order: Vec::new() };
+    let mut placement = Placement { scene_node: vec![None; root.nodes.len()], order: Vec::new(), places };
     let mut stack: Vec<(usize, Option<u32>)> = roots.into_iter().rev().map(|n| (n, None)).collect();
     while let Some((index, parent)) = stack.pop() {
         let node = &root.nodes[index];
         let place = scene.nodes.len() as u32;
         let name = node.name.clone().unwrap_or_else(|| format!("nodes[{index}]"));
-        scene.nodes.push(Node { name, parent, local: local(file, root, index)? });
+        scene.nodes.push(Node { name, parent, local: local(file, root, &placement.places, index)? });
         placement.scene_node[index] = Some(place);
         placement.order.push(index);
         stack.extend(node.children.iter().flatten().rev().map(|c| (c.value(), Some(place))));
@@ -120,7 +178,7 @@ pub(super) fn find_draws(
     placement: &Placement,
     scene: &mut Scene,
 ) -> Result<Draws, SceneError> {
-    let rest_worlds = scene.world_from_nodes(None);
+    let rest_worlds = scene.file_from_nodes(None);
     let mut plain: HashMap<usize, usize> = HashMap::new();
     let mut variants = Vec::new();
     let mut draws = Vec::new();
@@ -143,10 +201,11 @@ pub(super) fn find_draws(
         let mut draw_node = place;
         if let Some(skin) = skin {
             scene.warnings.push(format!("nodes[{index}]: its skin is drawn in the rest pose"));
-            variant.joints = joint_matrices(accessors, root, placement, &rest_worlds, skin.value())?;
+            let skin = (skin.value(), skin_origin(root, placement, &rest_worlds, skin.value()));
+            variant.joints = joint_matrices(accessors, root, placement, &rest_worlds, skin)?;
             draw_node = scene.nodes.len() as u32;
             let name = format!("{} (skinned)", scene.nodes[place as usize].name);
-            scene.nodes.push(Node { name, parent: None, local: Affine3A::IDENTITY });
+            scene.nodes.push(Node { name, parent: None, local: DAffine3::from_translation(skin.1) });
         }
         let own_shape = skin.is_some() || node.weights.is_some() && has_targets;
         let variant = if own_shape {
@@ -196,13 +255,22 @@ fn check_count(file: &Path, count: usize) -> Result<(), SceneError> {
     Ok(())
 }
 
-/// World from bind space for each joint of a skin, at rest.
+/// Origin of the vertices of a skin, which are put into their place on loading: beside its first joint.
+fn skin_origin(root: &Root, placement: &Placement, worlds: &[DAffine3], skin: usize) -> DVec3 {
+    let joint = root.skins[skin].joints.first().and_then(|joint| placement.scene_node[joint.value()]);
+    joint.map_or(DVec3::ZERO, |node| {
+        let place = worlds[node as usize].translation;
+        crate::origin::origin_of(place - 1.0, place + 1.0)
+    })
+}
+
+/// The skin's origin from bind space for each joint of a skin, at rest.
 fn joint_matrices(
     accessors: &Accessors,
     root: &Root,
     placement: &Placement,
-    worlds: &[Affine3A],
-    index: usize,
+    worlds: &[DAffine3],
+    (index, origin): (usize, DVec3),
 ) -> Result<Vec<Mat4>, SceneError> {
     let skin = &root.skins[index];
     let bind = match skin.inverse_bind_matrices {
@@ -220,7 +288,10 @@ fn joint_matrices(
     let joints = skin.joints.iter().zip(bind).enumerate();
     joints
         .map(|(k, (joint, bind))| match placement.scene_node[joint.value()] {
-            Some(node) => Ok(Mat4::from(worlds[node as usize]) * Mat4::from_cols_array(&bind)),
+            Some(node) => {
+                let world = DMat4::from_translation(-origin) * DMat4::from(worlds[node as usize]);
+                Ok((world * Mat4::from_cols_array(&bind).as_dmat4()).as_mat4())
+            }
             None => Err(SceneError::invalid(
                 accessors.file,
                 format!("skins[{index}].joints[{k}]"),
@@ -268,24 +339,27 @@ fn instance_transforms(
     let scales = vec3(s, 1.0)?;
     let rotations = r.map_or(Ok(vec![[0.0, 0.0, 0.0, 1.0]; count]), |a| accessors.floats::<4>(a, 4, 0.0))?;
     Ok((0..count)
-        .map(|k| {
-            let q = Quat::from_array(rotations[k]);
-            let rotation = if q.length_squared() > 0.0 { q.normalize() } else { Quat::IDENTITY };
-            Trs { translation: translations[k].into(), rotation, scale: scales[k].into() }
+        .map(|k| Trs {
+            translation: DVec3::from_array(translations[k].map(f64::from)),
+            rotation: DQuat::from_array(rotations[k].map(f64::from)),
+            scale: DVec3::from_array(scales[k].map(f64::from)),
         })
         .collect())
 }
 
-/// Makes the instances: each mesh of a variant at each of its draws. `worlds` is world from node.
+/// Makes the instances: each mesh of a variant at each of its draws, as nodes are at a time; and chooses the scene's origin.
 pub(super) fn make_instances(
     file: &Path,
     draws: &Draws,
     meshes: &[std::ops::Range<u32>],
-    worlds: &[Affine3A],
+    time_s: Option<f64>,
     scene: &mut Scene,
 ) -> Result<(), SceneError> {
+    let file_from_nodes = scene.file_from_nodes(time_s);
+    let mut worlds = Vec::with_capacity(draws.draws.len());
     for draw in &draws.draws {
-        let world = worlds[draw.node as usize];
+        let file_from_object = file_from_nodes[draw.node as usize];
+        let world = file_from_object.as_affine3a();
         if !world.is_finite() {
             let at = format!("node {:?}", scene.nodes[draw.node as usize].name);
             return Err(SceneError::invalid(
@@ -298,7 +372,9 @@ pub(super) fn make_instances(
         check_count(file, scene.instances.len() + meshes[draw.variant].len())?;
         let instance = |mesh| Instance { mesh, node: draw.node, world_from_object: world };
         scene.instances.extend(meshes[draw.variant].clone().map(instance));
+        worlds.resize(scene.instances.len(), file_from_object);
     }
+    scene.settle(&worlds);
     Ok(())
 }
 

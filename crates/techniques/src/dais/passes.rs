@@ -2,7 +2,7 @@
 
 use afterlight_graph::{BufferHandle, BufferRole, DepthTest, Graph, PassRole, RasterPass};
 
-use afterlight_frame::{Frame, TechniqueError};
+use afterlight_frame::{DrawCommands, Frame, TechniqueError};
 use afterlight_stages::surfaces::geometry::SceneDraws;
 
 /// What the first pass draws: depth alone. In tessellated frames both passes have a geometry shader, so that their depths are
@@ -60,10 +60,20 @@ impl FillPass {
 
     /// Binds what the pass counts triangles with and adds its draws.
     pub fn draw(self, frame: &Frame<'_>, pass: &mut RasterPass<'_>) {
+        self.counted(pass).draw(frame, pass);
+    }
+
+    /// The same with the draws that commands of the frame's own list.
+    pub fn draw_listed(self, frame: &Frame<'_>, pass: &mut RasterPass<'_>, draws: &DrawCommands) {
+        self.counted(pass).draw_listed(frame, pass, draws);
+    }
+
+    /// Its surfaces, once what they count triangles with is bound.
+    fn counted(self, pass: &mut RasterPass<'_>) -> SceneDraws {
         if let Some(numbers) = self.numbers {
             let _numbers = pass.write("TriangleNumbers", numbers);
         }
-        self.surfaces.draw(frame, pass);
+        self.surfaces
     }
 }
 

@@ -12,7 +12,7 @@ use afterlight_graph::{BufferHandle, BufferRole, Graph, ImageHandle, ImageInfo, 
 use crate::dais::{self, Asked, Cache, CacheParams, FillPass, LowRate};
 use afterlight_cost::{Cost, Workload};
 use afterlight_frame::{
-    Answers, Exactness, Frame, Info, MULTIPLE_SAMPLES, Need, Params, Source, SourceSlots, Technique,
+    Answers, DrawCommands, Exactness, Frame, Info, MULTIPLE_SAMPLES, Need, Params, Source, SourceSlots, Technique,
     TechniqueError, capacity::FIRST_GUESS, params::AutoOr, scene::DRAW_TRIANGLES, views,
 };
 use afterlight_shader::Shader;
@@ -93,10 +93,13 @@ impl Technique for DaisList {
         let mut triangles = Triangles::new(graph, frame, params.cache, params.record)?;
         let rows = band_rows(frame, params.bands);
         // Held for one band: the next one draws over it.
-        let info = ImageInfo::new(frame.small_depth_stencil_format(), frame.width_px, rows);
+        let info = ImageInfo::new(frame.depth_stencil_format(), frame.width_px, rows);
         let mut depth = graph.image("dais-list/depth", BufferRole::Depth, info.samples(frame.samples));
         for (first_row, number) in (0..frame.height_px).step_by(rows as usize).zip(1..) {
-            let band = Band { number, first_row };
+            let end_row = (first_row + rows).min(frame.height_px);
+            let draws =
+                frame.draws_in_rows(graph, &format!("dais-list/draws {number}"), first_row..end_row)?;
+            let band = Band { number, first_row, draws };
             depth = band.draw_depth(graph, frame, depth)?;
             (depth, lists, triangles) = band.fill(graph, frame, depth, lists, triangles)?;
         }
@@ -270,6 +273,8 @@ fn band_rows(frame: &Frame<'_>, bands: u32) -> u32 {
 struct Band {
     number: u32,
     first_row: u32,
+    /// Draws that reach the rows: a vertex of another band costs as much as one of this.
+    draws: DrawCommands,
 }
 
 impl Band {
@@ -297,7 +302,7 @@ impl Band {
         frame.bind_scene(&mut pass);
         let depth = pass.depth(depth, Load::Clear(0.0));
         pass.stencil_clear(0).viewport(self.viewport(frame));
-        surfaces.draw(frame, &mut pass);
+        surfaces.draw_listed(frame, &mut pass, &self.draws);
         pass.finish();
         Ok(depth)
     }
@@ -329,7 +334,7 @@ impl Band {
         pass.viewport(self.viewport(frame));
         let lists = lists.written_by(&mut pass);
         let triangles = triangles.written_by(&mut pass);
-        fill.draw(frame, &mut pass);
+        fill.draw_listed(frame, &mut pass, &self.draws);
         pass.finish();
         Ok((depth, lists, triangles))
     }

@@ -19,7 +19,7 @@ parameters! {
         /// nodes of the lists; auto: as many as the view needs, counted; fixed: what finds none is dropped and told
         nodes: AutoOr<u32> = AutoOr::Auto, "nodes", 0..=(1 << 30);
         /// horizontal bands of the image that are drawn one after another, so that depth at the samples is held for one of them
-        bands: u32 = 2, "bands", 1..=16;
+        bands: u32 = 4, "bands", 1..=16;
         /// The cache through which fragments store triangles.
         ..cache: CacheParams;
         /// What is stored of a triangle.

@@ -95,7 +95,7 @@ impl Technique for DeferredStencil {
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
-        let filled = gbuffer::fill(graph, frame, "deferred-stencil", vk::Format::D32_SFLOAT_S8_UINT)?;
+        let filled = gbuffer::fill(graph, frame, "deferred-stencil", frame.depth_stencil_format())?;
         let mark = volumes::volume_state(frame, None, vk::CullModeFlags::NONE, vec![Blend::NONE])?
             .depth(IN_FRONT)
             .stencil(MARK);

@@ -80,7 +80,7 @@ impl Technique for ForwardMultipass {
         let depth = graph.image(
             "forward-multipass/depth",
             BufferRole::Depth,
-            frame.image_info(vk::Format::D32_SFLOAT_S8_UINT),
+            frame.image_info(frame.depth_stencil_format()),
         );
         let ambient = SceneDraws::shaded(
             frame,

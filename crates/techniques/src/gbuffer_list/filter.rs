@@ -7,7 +7,7 @@ use afterlight_frame::scene::SceneGpu;
 use super::params::{DepthEdges, FilterParams, Region};
 
 /// Specialization constants of `filter.glsl`.
-pub(super) fn constants(params: &FilterParams) -> Vec<(String, u32)> {
+pub(super) fn constants(params: &FilterParams, eye_moved_m: f32) -> Vec<(String, u32)> {
     let share = |percent: f32| (percent / 100.0).bits();
     [
         ("FILTERS", params.filters.bits()),
@@ -16,7 +16,7 @@ pub(super) fn constants(params: &FilterParams) -> Vec<(String, u32)> {
         ("REGION_TOP", share(params.top)),
         ("REGION_RIGHT", share(params.right)),
         ("REGION_BOTTOM", share(params.bottom)),
-        ("DEPTH_THRESHOLD_M", params.depth_threshold_m.bits()),
+        ("DEPTH_THRESHOLD_M", (params.depth_threshold_m - eye_moved_m).bits()),
         ("EDGE_THRESHOLD", params.edge_threshold.bits()),
         ("DEPTH_RANGE", u32::from(params.depth_edges == DepthEdges::Range)),
     ]

@@ -263,8 +263,8 @@ fn empty_lists(
 }
 
 /// Specialization constants of shaders that build the lists.
-fn build_constants(layout: &Layout, filter: &FilterParams) -> Vec<(String, u32)> {
-    let mut all = filter::constants(filter);
+fn build_constants(frame: &Frame<'_>, layout: &Layout, filter: &FilterParams) -> Vec<(String, u32)> {
+    let mut all = filter::constants(filter, frame.eye_moved_m);
     all.extend(layout.constants().map(|(name, value)| (name.to_owned(), value)));
     all.push(("SAMPLES".to_owned(), layout.samples));
     all.push(("BLOCK_CAPACITY".to_owned(), layout.capacity));
@@ -282,7 +282,7 @@ fn fill_by_compute(
     let (blocks, count, flagged) = empty_lists(graph, frame, layout, &params.filter.objects)?;
     let shader = frame.shader(&format!("gbuffer_list/fill.comp{}", visible.tag('#')))?;
     let mut pass = frame.compute(graph, "gbuffer-list/fill", PassRole::Geometry, &shader);
-    set_constants(&mut pass, build_constants(layout, &params.filter));
+    set_constants(&mut pass, build_constants(frame, layout, &params.filter));
     visible.bind(frame, &mut pass);
     pass.read("SingleSampleDraws", &flagged);
     let blocks = pass.write("Blocks", blocks);
@@ -319,7 +319,7 @@ fn fill_by_raster(
     let depth = graph.image(
         "gbuffer-list/depth",
         BufferRole::Depth,
-        frame.multisampled_info(frame.small_depth_stencil_format()),
+        frame.multisampled_info(frame.depth_stencil_format()),
     );
     let depth_only = SceneDraws::depth_only(frame)?;
     let (opaque, masked) = match layout.samples {
@@ -332,7 +332,7 @@ fn fill_by_raster(
         .stencil(FIRST_FRAGMENT, 1);
     // Masked surfaces keep off what opaque ones have, and share the rest by claims.
     fill.masked_stencil = Some(NOT_TAKEN);
-    fill.constants = build_constants(layout, filter);
+    fill.constants = build_constants(frame, layout, filter);
     let (blocks, count, flagged) = empty_lists(graph, frame, layout, &filter.objects)?;
     let claims = claims(graph, frame, INFO.id, layout.samples);
 

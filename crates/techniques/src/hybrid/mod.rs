@@ -165,7 +165,7 @@ fn fill(graph: &mut Graph, frame: &Frame<'_>, draws: &Draws) -> Result<GBuffer, 
             .stencil(OWNER, COLORLESS);
     // Accumulation and base colour stay.
     lobe.blend = vec![Blend::NONE, Blend::NONE, Blend::REPLACE, Blend::REPLACE];
-    Ok(gbuffer::fill_by(graph, frame, INFO.id, vk::Format::D32_SFLOAT_S8_UINT, |pass| {
+    Ok(gbuffer::fill_by(graph, frame, INFO.id, frame.depth_stencil_format(), |pass| {
         pass.stencil_clear(COLORLESS);
         draws.draw(frame, pass, |path| Some(if path == Path::Deferred { &whole } else { &lobe }));
     }))

@@ -116,7 +116,7 @@ fn fill(graph: &mut Graph, frame: &Frame<'_>) -> Result<LobeBuffer, TechniqueErr
     let roughness =
         graph.image("light-prepass/roughness", BufferRole::Surfaces, frame.image_info(vk::Format::R8_UNORM));
     let has_stencil = frame.samples == 1;
-    let format = if has_stencil { vk::Format::D32_SFLOAT_S8_UINT } else { vk::Format::D32_SFLOAT };
+    let format = if has_stencil { frame.depth_stencil_format() } else { vk::Format::D32_SFLOAT };
     let depth = graph.image("light-prepass/depth", BufferRole::Depth, frame.image_info(format));
     let surfaces = SceneDraws::shaded(frame, "light_prepass/lobe.frag", "light_prepass/lobe.frag#mask")?;
     let mut pass = graph.raster("light-prepass/gbuffer", PassRole::Geometry);

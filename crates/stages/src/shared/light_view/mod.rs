@@ -62,7 +62,7 @@ impl SourceView {
 
     /// World to clip.
     pub fn clip_from_world(&self) -> Mat4 {
-        self.camera.clip_from_view(1.0) * self.camera.view_from_world()
+        self.camera.clip_from_world(1.0)
     }
 
     /// Half the height of the view's plane, m; under perspective of the plane at distance 1.

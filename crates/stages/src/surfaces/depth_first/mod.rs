@@ -36,8 +36,7 @@ pub fn draw_depth(
     technique: &str,
 ) -> Result<ImageHandle, TechniqueError> {
     let name = format!("{technique}/depth");
-    let depth =
-        graph.image(&name, BufferRole::Depth, frame.multisampled_info(vk::Format::D32_SFLOAT_S8_UINT));
+    let depth = graph.image(&name, BufferRole::Depth, frame.multisampled_info(frame.depth_stencil_format()));
     Ok(SceneDraws::depth_only(frame)?.fill_depth(graph, frame, (&name, PassRole::DepthPrepass), depth))
 }
 

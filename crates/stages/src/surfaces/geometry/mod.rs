@@ -14,7 +14,7 @@ use afterlight_graph::{VertexAttribute, VertexLayout, VertexStream};
 use afterlight_shader::Shader;
 
 use afterlight_frame::{
-    Frame, MIN_TESSELLATE_PX, TechniqueError,
+    DrawCommands, Frame, MIN_TESSELLATE_PX, TechniqueError,
     scene::{BUCKETS, Bucket, draw_list::COMMAND_BYTES},
 };
 
@@ -183,16 +183,32 @@ impl SceneDraws {
 
     /// Adds the draws in view to a pass, opaque surfaces first. Resources are bound by [`Frame::bind_scene`].
     pub fn draw(&self, frame: &Frame<'_>, pass: &mut RasterPass<'_>) {
+        let b = &frame.buffers;
+        self.draw_buckets(frame, pass, (&b.commands, &b.command_counts), &frame.scene.bucket_first);
+    }
+
+    /// Adds the draws that commands of the frame's own list to a pass, as [`Self::draw`].
+    pub fn draw_listed(&self, frame: &Frame<'_>, pass: &mut RasterPass<'_>, draws: &DrawCommands) {
+        self.draw_buckets(frame, pass, (&draws.commands, &draws.counts), &draws.first);
+    }
+
+    fn draw_buckets(
+        &self,
+        frame: &Frame<'_>,
+        pass: &mut RasterPass<'_>,
+        (commands, counts): (&BufferHandle, &BufferHandle),
+        firsts: &[u32; BUCKETS + 1],
+    ) {
         for bucket in (0..BUCKETS).map(Bucket) {
-            let first = frame.scene.bucket_first[bucket.0];
-            let max = frame.scene.bucket_first[bucket.0 + 1] - first;
+            let first = firsts[bucket.0];
+            let max = firsts[bucket.0 + 1] - first;
             if max == 0 {
                 continue;
             }
             let call = DrawCall::IndexedIndirectCount {
-                buffer: &frame.buffers.commands,
+                buffer: commands,
                 offset: COMMAND_BYTES * u64::from(first),
-                count_buffer: &frame.buffers.command_counts,
+                count_buffer: counts,
                 count_offset: 4 * bucket.0 as u64,
                 max,
                 stride: COMMAND_BYTES as u32,
