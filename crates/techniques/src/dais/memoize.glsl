@@ -1,7 +1,15 @@
 // The memoization cache: triangle to its place in the triangle buffer (Schied and Dachsbacher 2015, section 4.1; Liktor and
-// Dachsbacher 2012). Every fragment looks its triangle up; one that finds nothing takes the bucket's lock, a slot of the
-// triangle buffer, and stores the triangle for the derivative pass: its ID in the first word of its record, or, with
-// WHOLE_TRIANGLE, whose IDs are numbers that lead nowhere, its vertices in the record. Needs draw_material.
+// Dachsbacher 2012). Every fragment looks its triangle up; one that finds nothing locks the bucket, takes a slot of the triangle
+// buffer, and stores the triangle for the derivative pass: its ID in the first word of its record, or, with WHOLE_TRIANGLE, whose
+// IDs are numbers that lead nowhere, its vertices in the record. Needs draw_material.
+//
+// A bucket's version is its lock. It is odd while a fragment replaces the bucket's entries and grows by two with every
+// replacement; so entries that were read between two equal, even versions stood in the bucket together (a sequence lock: Boehm, "Can
+// seqlocks get along with programming language memory models?", MSPC 2012). To compare the ID before and after the place is
+// read does not suffice: the triangle may have left the bucket and come back in between, and the place is another's
+// (38 dB now and then with one bucket). The lock is taken by exchanging the version that was read before the entries, so that a
+// fragment which gets it knows that they still stand. All orders of these steps are tried by
+// tests/interleavings/cache.rs, which changes with this file.
 //
 // No lock can hang. A fragment that fails to take a lock does not wait inside the loop's turn but polls again, at most POLLS times;
 // one that takes it lets go within the same turn, whatever the other lanes of its subgroup do. After that the triangle is
@@ -14,14 +22,13 @@
 #include "surfaces/geometry/whole_triangle.glsl"
 #endif
 
-// Triangle ID and its place, two entries in each bucket. The place is written first and the ID last; while an entry is replaced its ID is
-// NO_ID. It is volatile because a look-up reads the ID twice: a compiler that merged the two reads would return another triangle's
-// place (32 dB on lavapipe).
+// Triangle ID and its place, two entries in each bucket, the newer first. Both buffers are volatile because a compiler that merged
+// the two reads of a version would let every look-up through (32 dB on lavapipe when IDs were compared).
 layout(set = 0, binding = 10, scalar) coherent volatile buffer CacheEntries {
     uvec2 cache_entries[];
 };
-layout(set = 0, binding = 11, scalar) coherent buffer CacheLocks {
-    uint cache_locks[];
+layout(set = 0, binding = 11, scalar) coherent volatile buffer CacheVersions {
+    uint cache_versions[];
 };
 layout(set = 0, binding = 12, scalar) buffer TriangleCount {
     uint triangles_needed;
@@ -34,27 +41,11 @@ layout(constant_id = 11) const uint TRIANGLE_CAPACITY = 0u;
 layout(constant_id = 12) const uint CACHE_BUCKETS = 8192u;
 layout(constant_id = 13) const uint POLLS = 32u;
 
-const uint NOT_CACHED = 0xffffffffu;
-const uint NO_ID = 0u;      // value of the cleared cache; IDs are stored plus one
+// IDs are stored plus one: zero, the value of the cleared cache, is none.
 
 // A hash that spreads neighbouring triangles, which are drawn at the same time, over the buckets.
 uint bucket_of(uint id) {
     return (id * 2654435761u >> 16) % CACHE_BUCKETS;
-}
-
-uint look_up(uint bucket, uint id) {
-    for (uint i = bucket * 2u; i < bucket * 2u + 2u; ++i) {
-        if (cache_entries[i].x == id + 1u) {
-            memoryBarrierBuffer();
-            uint place = cache_entries[i].y;
-            memoryBarrierBuffer();
-            // The entry has not changed in between, so the place belongs to this ID.
-            if (cache_entries[i].x == id + 1u) {
-                return place;
-            }
-        }
-    }
-    return NOT_CACHED;
 }
 
 #ifdef WHOLE_TRIANGLE
@@ -98,33 +89,32 @@ uint store_triangle(uint id) {
     return place;
 }
 
+// Puts a triangle first in a bucket that this fragment has locked: the older entry leaves it, the newer becomes the older.
+void replace_entries(uint bucket, uvec2 newer, uvec2 newest) {
+    memoryBarrierBuffer();  // who sees an entry of these sees that the version is odd
+    cache_entries[bucket * 2u + 1u] = newer;
+    cache_entries[bucket * 2u] = newest;
+    memoryBarrierBuffer();  // who sees the next version sees these entries
+}
+
 uint memoized(uint id) {
     uint bucket = bucket_of(id);
     for (uint poll = 0u; poll < POLLS; ++poll) {
-        uint place = look_up(bucket, id);
-        if (place != NOT_CACHED) {
-            return place;
+        uint version = cache_versions[bucket];
+        if ((version & 1u) != 0u) {
+            continue;
         }
-        if (atomicCompSwap(cache_locks[bucket], 0u, 1u) == 0u) {
-            // Another fragment may have stored the triangle between the look-up and taking the lock.
-            place = look_up(bucket, id);
-            if (place == NOT_CACHED) {
-                place = store_triangle(id);
-                // Replaces the older entry: the first entry moves into the second.
-                uvec2 older = cache_entries[bucket * 2u];
-                cache_entries[bucket * 2u + 1u].x = NO_ID;
-                memoryBarrierBuffer();
-                cache_entries[bucket * 2u + 1u].y = older.y;
-                memoryBarrierBuffer();
-                cache_entries[bucket * 2u + 1u].x = older.x;
-                cache_entries[bucket * 2u].x = NO_ID;
-                memoryBarrierBuffer();
-                cache_entries[bucket * 2u].y = place;
-                memoryBarrierBuffer();
-                cache_entries[bucket * 2u].x = id + 1u;
+        memoryBarrierBuffer();  // the entries are read after the version
+        uvec2 newer = cache_entries[bucket * 2u], older = cache_entries[bucket * 2u + 1u];
+        memoryBarrierBuffer();  // the version is read again after the entries
+        if (newer.x == id + 1u || older.x == id + 1u) {
+            if (cache_versions[bucket] == version) {
+                return newer.x == id + 1u ? newer.y : older.y;
             }
-            memoryBarrierBuffer();
-            atomicExchange(cache_locks[bucket], 0u);
+        } else if (atomicCompSwap(cache_versions[bucket], version, version + 1u) == version) {
+            uint place = store_triangle(id);
+            replace_entries(bucket, newer, uvec2(id + 1u, place));
+            atomicExchange(cache_versions[bucket], version + 2u);
             return place;
         }
     }

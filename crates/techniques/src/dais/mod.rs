@@ -28,6 +28,7 @@ use afterlight_stages::{
     },
     surfaces::shade::SurfaceSource,
     surfaces::{
+        claims,
         compute_raster::{ComputeRasterParams, Visibility},
         shade,
         triangles::{self, Records},
@@ -53,7 +54,7 @@ const POLLS: u32 = 32;
 /// The memoization cache of a frame (section 4.1).
 pub(crate) struct Cache {
     entries: BufferHandle,
-    locks: BufferHandle,
+    versions: BufferHandle,
     buckets: u32,
 }
 
@@ -65,14 +66,19 @@ impl Cache {
             BufferRole::MemoizationCache,
             16 * u64::from(buckets),
         );
-        let locks = graph.buffer(
-            &format!("{technique}/cache locks"),
+        let versions = graph.buffer(
+            &format!("{technique}/cache versions"),
             BufferRole::MemoizationCache,
             4 * u64::from(buckets),
         );
         Self {
             entries: graph.clear_buffer(&format!("{technique}/clear cache"), PassRole::Geometry, entries, 0),
-            locks: graph.clear_buffer(&format!("{technique}/clear locks"), PassRole::Geometry, locks, 0),
+            versions: graph.clear_buffer(
+                &format!("{technique}/clear versions"),
+                PassRole::Geometry,
+                versions,
+                0,
+            ),
             buckets,
         }
     }
@@ -87,7 +93,7 @@ impl Cache {
     /// Binds it to the pass whose fragments store triangles.
     pub fn written_by(self, pass: &mut RasterPass<'_>) -> Self {
         let entries = pass.write("CacheEntries", self.entries);
-        Self { entries, locks: pass.write("CacheLocks", self.locks), ..self }
+        Self { entries, versions: pass.write("CacheVersions", self.versions), ..self }
     }
 }
 
@@ -269,21 +275,31 @@ fn record_cached(
     let references = name(if wide { "wide references" } else { "references" });
     let references =
         graph.image(&references, BufferRole::Visibility, frame.multisampled_info(vk::Format::R8G8B8A8_UNORM));
-    let depth =
-        graph.image(&name("depth"), BufferRole::Depth, frame.multisampled_info(vk::Format::D32_SFLOAT));
+    let depth = graph.image(
+        &name("depth"),
+        BufferRole::Depth,
+        frame.multisampled_info(frame.depth_stencil_format()),
+    );
     let cache = Cache::new(graph, technique, params.cache);
     let list = triangles::List::new(graph, frame, technique, REFERENCES_MAX)?;
     let tags = if wide { &["wide"][..] } else { &[] };
     let depth_only = depth_surfaces(frame)?;
     let mut fill = FillPass::new(graph, frame, technique, "dais/fill.frag", tags)?;
     fill.surfaces.constants = cache.constants(&list);
+    // Wide references are also for devices that do not tell what a fragment covers after the depth test: there it can claim nothing.
+    let mut claims = None;
+    if !wide {
+        fill.surfaces.constants.push(("SAMPLES".to_owned(), frame.samples));
+        claims = claims::claims(graph, frame, technique, frame.samples);
+    }
 
     let depth = depth_only.fill_depth(graph, frame, (&name("depth"), PassRole::DepthPrepass), depth);
 
     let mut pass = graph.raster(&name("fill"), PassRole::Geometry);
     frame.bind_scene(&mut pass);
     let references = pass.color(references, Load::Clear(NO_TRIANGLE_RGBA8));
-    pass.depth_read_only(&depth);
+    let depth = pass.stencil(depth, Load::Keep);
+    let _claims = claims.map(|claims| pass.write("SampleClaims", claims));
     let _cache = cache.written_by(&mut pass);
     let list = list.written_by(&mut pass);
     fill.draw(frame, &mut pass);

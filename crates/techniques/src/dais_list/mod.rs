@@ -18,9 +18,8 @@ use afterlight_frame::{
 use afterlight_shader::Shader;
 use afterlight_stages::{
     lights::{cells, step},
-    surfaces::claims,
     surfaces::shade::SurfaceSource,
-    surfaces::{claims::NOT_TAKEN, depth_first::FIRST_FRAGMENT, triangles},
+    surfaces::{claims, triangles},
 };
 
 /// The technique.
@@ -29,9 +28,9 @@ pub static TECHNIQUE: DaisList = DaisList;
 /// See the module.
 pub struct DaisList;
 
-/// Most triangles that the reference of an entry tells apart.
+/// Most triangles that the reference of an entry tells apart; all ones is a triangle without a place.
 const fn references_max(samples: u32) -> u32 {
-    1 << if samples > 8 { 27 } else { 28 }
+    (1 << if samples > 8 { 27 } else { 28 }) - 1
 }
 
 /// Rows that bands are multiples of: whole quads, and tiles of the raster part.
@@ -78,7 +77,7 @@ impl Technique for DaisList {
         let mut triangles = Triangles::new(graph, frame, params.cache)?;
         let rows = band_rows(frame, params.bands);
         // Held for one band: the next one draws over it.
-        let info = ImageInfo::new(frame.small_depth_stencil_format(), frame.width_px, rows);
+        let info = ImageInfo::new(frame.depth_stencil_format(), frame.width_px, rows);
         let mut depth = graph.image("dais-list/depth", BufferRole::Depth, info.samples(frame.samples));
         for (first_row, number) in (0..frame.height_px).step_by(rows as usize).zip(1..) {
             let band = Band { number, first_row };
@@ -123,13 +122,15 @@ impl Lists {
             let buffer = graph.buffer(&format!("dais-list/{name}"), role, bytes);
             graph.clear_buffer(&format!("dais-list/clear {name}"), PassRole::Geometry, buffer, 0)
         };
+        let node_bytes = 8 * u64::from(capacity.max(1));
+        let nodes = match frame.scene.draw_count() {
+            // No fragment writes a node, and no head leads to one; what is read must have been written all the same.
+            0 => zeroed(graph, "nodes", BufferRole::SurfaceListNodes, node_bytes),
+            _ => graph.buffer("dais-list/nodes", BufferRole::SurfaceListNodes, node_bytes),
+        };
         Ok(Self {
             heads: zeroed(graph, "heads", BufferRole::SurfaceListHeads, 4 * pixels),
-            nodes: graph.buffer(
-                "dais-list/nodes",
-                BufferRole::SurfaceListNodes,
-                8 * u64::from(capacity.max(1)),
-            ),
+            nodes,
             node_count: zeroed(graph, "node count", BufferRole::SurfaceListNodes, 8),
             // Nobody asks what was dropped where nothing can be.
             drops: zeroed(
@@ -291,8 +292,6 @@ impl Band {
     ) -> Result<(ImageHandle, Lists, Triangles), TechniqueError> {
         let mut fill = FillPass::new(graph, frame, INFO.id, "dais_list/fill.frag", &[])?;
         let surfaces = &mut fill.surfaces;
-        (surfaces.stencil, surfaces.stencil_reference) = (Some(FIRST_FRAGMENT), 1);
-        surfaces.masked_stencil = Some(NOT_TAKEN);
         surfaces.constants = triangles.constants();
         let bounded = u32::from(lists.bounded);
         for (name, value) in

@@ -303,7 +303,7 @@ fn fill_by_raster(
     let depth = graph.image(
         "gbuffer-list/depth",
         BufferRole::Depth,
-        frame.multisampled_info(frame.small_depth_stencil_format()),
+        frame.multisampled_info(frame.depth_stencil_format()),
     );
     let depth_only = SceneDraws::depth_only(frame)?;
     let (opaque, masked) = match layout.samples {

@@ -47,10 +47,18 @@ vec4 tangent_from_changes(vec3 normal_ws, vec3 dp_dx, vec3 dp_dy, TextureCoordin
     return vec4(tangent, dot(cross(n, tangent), along_v) < 0.0 ? 1.0 : -1.0);
 }
 
-// First word of a record. In a frame that has more triangles than room, which is recorded again, those without a place show the
-// last.
+uint record_capacity() {
+    return uint(triangle_buffer.length()) / RECORD_WORDS;
+}
+
+// Whether a triangle found room. In a frame that has more triangles than room, some have no record.
+bool has_record(uint index) {
+    return index < record_capacity();
+}
+
+// First word of a record; of one that is not there, that of the last.
 uint record_at(uint index) {
-    return min(index, uint(triangle_buffer.length()) / RECORD_WORDS - 1u) * RECORD_WORDS;
+    return min(index, record_capacity() - 1u) * RECORD_WORDS;
 }
 
 // `pixel` is a place in pixels, whole at pixel centres.
