@@ -3,17 +3,17 @@
 // buffer, and stores the triangle for the derivative pass: its ID in the first word of its record, or, with WHOLE_TRIANGLE, whose
 // IDs are numbers that lead nowhere, its vertices in the record. Needs draw_material.
 //
-// A bucket's version is its lock. It is odd while a fragment replaces the bucket's entries and grows by two with every
-// replacement; so entries that were read between two equal, even versions stood in the bucket together (a sequence lock: Boehm, "Can
-// seqlocks get along with programming language memory models?", MSPC 2012). To compare the ID before and after the place is
-// read does not suffice: the triangle may have left the bucket and come back in between, and the place is another's
-// (38 dB now and then with one bucket). The lock is taken by exchanging the version that was read before the entries, so that a
-// fragment which gets it knows that they still stand. All orders of these steps are tried by
+// An entry is a place alone. Which triangle stands there is asked of the place itself, and no place is given twice in a frame: what an
+// entry leads to holds, whoever replaces the entry meanwhile. (With a triangle ID and its place in two words of the entry a
+// look-up could read the ID of one triangle and the place of another, though it read the ID again afterwards: the triangle may have
+// left the bucket and come back in between.) Look-ups therefore need no lock. Who stores a triangle takes one all the same,
+// so that the fragments of a new triangle, which come at once, store it once. All orders of these steps are tried by
 // tests/interleavings/cache.rs, which changes with this file.
 //
 // No lock can hang. A fragment that fails to take a lock does not wait inside the loop's turn but polls again, at most POLLS times;
 // one that takes it lets go within the same turn, whatever the other lanes of its subgroup do. After that the triangle is
-// stored once more, which costs memory and nothing else.
+// stored and cached without the lock, so that a fragment that is suspended with it costs others a record each, not one for every
+// fragment that comes meanwhile (thousands on a busy CPU).
 #ifndef AFTERLIGHT_MEMOIZE
 #define AFTERLIGHT_MEMOIZE
 #include "surfaces/triangles/record.glsl"
@@ -22,13 +22,17 @@
 #include "surfaces/geometry/whole_triangle.glsl"
 #endif
 
-// Triangle ID and its place, two entries in each bucket, the newer first. Both buffers are volatile because a compiler that merged
-// the two reads of a version would let every look-up through (32 dB on lavapipe when IDs were compared).
-layout(set = 0, binding = 10, scalar) coherent volatile buffer CacheEntries {
-    uvec2 cache_entries[];
+// Two entries in each bucket, the newer first: 0; a place plus one; or, of a triangle that found no place, NO_PLACE and its ID's lower
+// bits.
+layout(set = 0, binding = 10, scalar) coherent buffer CacheEntries {
+    uint cache_entries[];
 };
-layout(set = 0, binding = 11, scalar) coherent volatile buffer CacheVersions {
-    uint cache_versions[];
+layout(set = 0, binding = 11, scalar) coherent buffer CacheLocks {
+    uint cache_locks[];
+};
+// The triangle of each place: written once, before an entry leads to it. What is left of earlier frames is never asked for.
+layout(set = 0, binding = 18, scalar) coherent buffer StoredIds {
+    uint stored_ids[];
 };
 layout(set = 0, binding = 12, scalar) buffer TriangleCount {
     uint triangles_needed;
@@ -41,7 +45,9 @@ layout(constant_id = 11) const uint TRIANGLE_CAPACITY = 0u;
 layout(constant_id = 12) const uint CACHE_BUCKETS = 8192u;
 layout(constant_id = 13) const uint POLLS = 32u;
 
-// IDs are stored plus one: zero, the value of the cleared cache, is none.
+const uint NO_PLACE = 0x80000000u;      // set in an entry
+const uint NO_RECORD = 0xfffffffeu;     // the place of a triangle that found none: behind all places
+const uint NOT_CACHED = 0xffffffffu;
 
 // A hash that spreads neighbouring triangles, which are drawn at the same time, over the buckets.
 uint bucket_of(uint id) {
@@ -75,50 +81,67 @@ void store_vertices(uint record) {
 }
 #endif
 
+// Gives a triangle a place, or counts it as dropped.
 uint store_triangle(uint id) {
     uint place = atomicAdd(triangles_needed, 1u);
-    if (place < TRIANGLE_CAPACITY) {
-#ifdef WHOLE_TRIANGLE
-        store_vertices(place * RECORD_WORDS);
-#else
-        triangle_buffer[place * RECORD_WORDS] = id;
-#endif
-    } else {
+    if (place >= TRIANGLE_CAPACITY) {
         atomicAdd(triangles_dropped, 1u);
+        return NO_RECORD;
     }
+#ifdef WHOLE_TRIANGLE
+    store_vertices(place * RECORD_WORDS);
+#else
+    triangle_buffer[place * RECORD_WORDS] = id;
+#endif
     return place;
 }
 
-// Puts a triangle first in a bucket that this fragment has locked: the older entry leaves it, the newer becomes the older.
-void replace_entries(uint bucket, uvec2 newer, uvec2 newest) {
-    memoryBarrierBuffer();  // who sees an entry of these sees that the version is odd
-    cache_entries[bucket * 2u + 1u] = newer;
-    cache_entries[bucket * 2u] = newest;
-    memoryBarrierBuffer();  // who sees the next version sees these entries
+// The place to which an entry leads, if it is the triangle's own.
+uint place_of_entry(uint entry, uint id) {
+    if ((entry & NO_PLACE) != 0u) {
+        return (entry ^ id) << 1 == 0u ? NO_RECORD : NOT_CACHED;
+    }
+    memoryBarrierBuffer();  // the ID is read after the entry
+    return entry != 0u && stored_ids[entry - 1u] == id ? entry - 1u : NOT_CACHED;
+}
+
+uint look_up(uint bucket, uint id) {
+    uint place = place_of_entry(cache_entries[bucket * 2u], id);
+    return place != NOT_CACHED ? place : place_of_entry(cache_entries[bucket * 2u + 1u], id);
+}
+
+// Stores a triangle and puts it first in its bucket: the newer entry becomes the older, which leaves it.
+uint store_and_cache(uint bucket, uint id) {
+    uint place = store_triangle(id);
+    if (place != NO_RECORD) {
+        stored_ids[place] = id;
+    }
+    memoryBarrierBuffer();  // who sees the entry sees the ID
+    uint entry = place != NO_RECORD ? place + 1u : NO_PLACE | id;
+    cache_entries[bucket * 2u + 1u] = atomicExchange(cache_entries[bucket * 2u], entry);
+    return place;
 }
 
 uint memoized(uint id) {
     uint bucket = bucket_of(id);
     for (uint poll = 0u; poll < POLLS; ++poll) {
-        uint version = cache_versions[bucket];
-        if ((version & 1u) != 0u) {
-            continue;
+        uint place = look_up(bucket, id);
+        if (place != NOT_CACHED) {
+            return place;
         }
-        memoryBarrierBuffer();  // the entries are read after the version
-        uvec2 newer = cache_entries[bucket * 2u], older = cache_entries[bucket * 2u + 1u];
-        memoryBarrierBuffer();  // the version is read again after the entries
-        if (newer.x == id + 1u || older.x == id + 1u) {
-            if (cache_versions[bucket] == version) {
-                return newer.x == id + 1u ? newer.y : older.y;
+        if (atomicCompSwap(cache_locks[bucket], 0u, 1u) == 0u) {
+            memoryBarrierBuffer();
+            // Another fragment may have stored the triangle between the look-up and taking the lock.
+            place = look_up(bucket, id);
+            if (place == NOT_CACHED) {
+                place = store_and_cache(bucket, id);
             }
-        } else if (atomicCompSwap(cache_versions[bucket], version, version + 1u) == version) {
-            uint place = store_triangle(id);
-            replace_entries(bucket, newer, uvec2(id + 1u, place));
-            atomicExchange(cache_versions[bucket], version + 2u);
+            memoryBarrierBuffer();  // who takes the lock next sees the entry
+            atomicExchange(cache_locks[bucket], 0u);
             return place;
         }
     }
-    return store_triangle(id);
+    return store_and_cache(bucket, id);
 }
 
 // The number that identifies the fragment's triangle.

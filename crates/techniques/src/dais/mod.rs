@@ -44,8 +44,8 @@ pub static TECHNIQUE: Dais = Dais;
 /// See the module.
 pub struct Dais;
 
-/// Most triangles that a visibility sample's 32 bits tell apart; all ones is the background.
-const REFERENCES_MAX: u32 = u32::MAX - 1;
+/// Most triangles that the cache and a visibility sample's 32 bits tell apart: the highest bit marks entries without a place.
+const REFERENCES_MAX: u32 = (1 << 31) - 1;
 /// Most samples of a visibility sample's coverage mask.
 const COVERAGE_SAMPLES_MAX: u32 = 8;
 /// Polls of a locked bucket before a triangle is stored once more. The lock is held for some tens of instructions.
@@ -54,31 +54,29 @@ const POLLS: u32 = 32;
 /// The memoization cache of a frame (section 4.1).
 pub(crate) struct Cache {
     entries: BufferHandle,
-    versions: BufferHandle,
+    locks: BufferHandle,
+    stored_ids: BufferHandle,
     buckets: u32,
 }
 
 impl Cache {
-    /// Declares an empty cache.
-    pub fn new(graph: &mut Graph, technique: &str, CacheParams { buckets }: CacheParams) -> Self {
-        let entries = graph.buffer(
-            &format!("{technique}/cache entries"),
-            BufferRole::MemoizationCache,
-            16 * u64::from(buckets),
-        );
-        let versions = graph.buffer(
-            &format!("{technique}/cache versions"),
-            BufferRole::MemoizationCache,
-            4 * u64::from(buckets),
-        );
+    /// Declares an empty cache for triangles that are stored in a list.
+    pub fn new(
+        graph: &mut Graph,
+        technique: &str,
+        CacheParams { buckets }: CacheParams,
+        list: &triangles::List,
+    ) -> Self {
+        let mut buffer = |part: &str, words: u64| {
+            graph.buffer(&format!("{technique}/{part}"), BufferRole::MemoizationCache, 4 * words)
+        };
+        let entries = buffer("cache entries", 2 * u64::from(buckets));
+        let locks = buffer("cache locks", u64::from(buckets));
+        let stored_ids = buffer("stored ids", u64::from(list.capacity.max(1)));
         Self {
             entries: graph.clear_buffer(&format!("{technique}/clear cache"), PassRole::Geometry, entries, 0),
-            versions: graph.clear_buffer(
-                &format!("{technique}/clear versions"),
-                PassRole::Geometry,
-                versions,
-                0,
-            ),
+            locks: graph.clear_buffer(&format!("{technique}/clear locks"), PassRole::Geometry, locks, 0),
+            stored_ids,
             buckets,
         }
     }
@@ -93,7 +91,8 @@ impl Cache {
     /// Binds it to the pass whose fragments store triangles.
     pub fn written_by(self, pass: &mut RasterPass<'_>) -> Self {
         let entries = pass.write("CacheEntries", self.entries);
-        Self { entries, versions: pass.write("CacheVersions", self.versions), ..self }
+        let locks = pass.write("CacheLocks", self.locks);
+        Self { entries, locks, stored_ids: pass.write("StoredIds", self.stored_ids), ..self }
     }
 }
 
@@ -280,8 +279,8 @@ fn record_cached(
         BufferRole::Depth,
         frame.multisampled_info(frame.depth_stencil_format()),
     );
-    let cache = Cache::new(graph, technique, params.cache);
     let list = triangles::List::new(graph, frame, technique, REFERENCES_MAX)?;
+    let cache = Cache::new(graph, technique, params.cache, &list);
     let tags = if wide { &["wide"][..] } else { &[] };
     let depth_only = depth_surfaces(frame)?;
     let mut fill = FillPass::new(graph, frame, technique, "dais/fill.frag", tags)?;

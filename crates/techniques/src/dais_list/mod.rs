@@ -183,8 +183,8 @@ impl Triangles {
     fn new(graph: &mut Graph, frame: &Frame<'_>, cache: CacheParams) -> Result<Self, TechniqueError> {
         let most = references_max(frame.samples);
         if frame.tessellate_px.is_some() {
-            let cache = Cache::new(graph, INFO.id, cache);
-            return Ok(Self::Listed { cache, list: triangles::List::new(graph, frame, INFO.id, most)? });
+            let list = triangles::List::new(graph, frame, INFO.id, most)?;
+            return Ok(Self::Listed { cache: Cache::new(graph, INFO.id, cache, &list), list });
         }
         let triangles = u64::from(DRAW_TRIANGLES) * frame.scene.draw_count() as u64;
         if triangles > u64::from(most) {

@@ -37,8 +37,8 @@ pub type Registers = [u32; 8];
 
 /// What threads run.
 pub trait Protocol {
-    /// Words of shared memory, all zero in the beginning.
-    fn words(&self) -> usize;
+    /// Words of shared memory in the beginning.
+    fn start(&self) -> Vec<u32>;
     /// Steps of a group, for what the thread is asked for.
     fn group(&self, group: u32, regs: &Registers, asked: u32) -> Vec<Step>;
     /// What follows a group. It may set registers.
@@ -82,7 +82,7 @@ pub struct Explored {
 /// # Errors
 /// What went wrong in some order.
 pub fn explore(protocol: &dyn Protocol, asked: &[&[u32]]) -> Result<Explored, String> {
-    let mut first = State { memory: vec![0; protocol.words()], threads: Vec::new() };
+    let mut first = State { memory: protocol.start(), threads: Vec::new() };
     for asked in asked {
         let mut thread =
             Thread { done: 0, group: 0, pending: 0, steps: Vec::new(), regs: [0; 8], results: Vec::new() };
@@ -98,12 +98,12 @@ pub fn explore(protocol: &dyn Protocol, asked: &[&[u32]]) -> Result<Explored, St
         }
         explored.states += 1;
         let mut ended = true;
-        for number in 0..state.threads.len() {
+        for (number, asked) in asked.iter().enumerate() {
             let pending = state.threads[number].pending;
             for step in (0..32).filter(|step| pending >> step & 1 != 0) {
                 ended = false;
                 let mut next = state.clone();
-                run(protocol, &mut next, number, step, asked[number])?;
+                run(protocol, &mut next, number, step, asked)?;
                 open.push(next);
             }
         }

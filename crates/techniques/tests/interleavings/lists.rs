@@ -58,8 +58,8 @@ impl List {
 }
 
 impl Protocol for List {
-    fn words(&self) -> usize {
-        NODES + 2 * NODES_MAX
+    fn start(&self) -> Vec<u32> {
+        vec![0; NODES + 2 * NODES_MAX]
     }
 
     fn group(&self, group: u32, regs: &Registers, asked: u32) -> Vec<Step> {
@@ -185,8 +185,8 @@ fn kept(word: u32, bits: u32) -> Result<(), String> {
 }
 
 impl Protocol for Bits {
-    fn words(&self) -> usize {
-        1
+    fn start(&self) -> Vec<u32> {
+        vec![0; 1]
     }
 
     fn group(&self, group: u32, regs: &Registers, asked: u32) -> Vec<Step> {
@@ -259,8 +259,8 @@ struct Table {
 const SLOTS: usize = 3;
 
 impl Protocol for Table {
-    fn words(&self) -> usize {
-        SLOTS
+    fn start(&self) -> Vec<u32> {
+        vec![0; SLOTS]
     }
 
     fn group(&self, group: u32, regs: &Registers, name: u32) -> Vec<Step> {

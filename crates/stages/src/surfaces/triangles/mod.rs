@@ -137,7 +137,7 @@ impl List {
         pass.finish();
         // The triangles of tessellation are mostly small: hardly any is stored twice.
         let slack = if frame.tessellate_px.is_some() { capacity::STEADY } else { capacity::UNSTEADY };
-        frame.watch_with(graph, "triangles", &self.count, self.capacity, false, slack);
+        frame.watch_varying(graph, "triangles", &self.count, self.capacity, slack);
         Ok(Records { words, ids, capacity: self.capacity })
     }
 }
