@@ -59,6 +59,8 @@ pub struct Demand {
     capacity: u32,
     fixed: bool,
     slack_eighths: u32,
+    /// Whether what is needed depends on the order in which the device runs threads.
+    varies: bool,
 }
 
 impl Demand {
@@ -112,20 +114,27 @@ impl Capacities {
 
     /// Capacities for another recording, or `None` where those of this one fit what was counted.
     pub fn next(&self, counters: &[Counter]) -> Option<Self> {
+        let demands = self.demands.borrow();
+        let demand = |c: &Counter| demands.iter().find(|d| d.name == c.name);
+        // More than needed: the next frame may need a little more or less.
+        let room = |c: &Counter| {
+            let slack_eighths = u64::from(demand(c).map_or(STEADY, |d| d.slack_eighths));
+            let more = u64::from(c.needed) * slack_eighths / 8 + u64::from(SLACK / 8);
+            u32::try_from(u64::from(c.needed) + more).unwrap_or(u32::MAX)
+        };
+        // What varies by order must leave half of that room, or the next frame may fall short: eight triangles through a busy bucket fit
+        // the first guess by chance.
+        let least = |c: &Counter| match demand(c).is_some_and(|d| d.varies) {
+            true => c.needed + (room(c) - c.needed) / 2,
+            false => c.needed,
+        };
         let fits = |c: &Counter| {
             c.fixed
-                || c.needed <= c.capacity && (c.capacity - c.needed <= SLACK || c.capacity / 4 <= c.needed)
+                || least(c) <= c.capacity && (c.capacity - c.needed <= SLACK || c.capacity / 4 <= c.needed)
         };
         if counters.iter().all(fits) {
             return None;
         }
-        // More than needed: the next frame may need a little more or less.
-        let demands = self.demands.borrow();
-        let slack = |name: &str| demands.iter().find(|d| d.name == name).map_or(STEADY, |d| d.slack_eighths);
-        let room = |c: &Counter| {
-            let more = u64::from(c.needed) * u64::from(slack(&c.name)) / 8 + u64::from(SLACK / 8);
-            u32::try_from(u64::from(c.needed) + more).unwrap_or(u32::MAX)
-        };
         let known =
             counters.iter().map(|c| (c.name.clone(), if fits(c) { c.capacity } else { room(c) })).collect();
         Some(Self { known, demands: RefCell::default() })
@@ -149,21 +158,24 @@ impl Frame<'_> {
         capacity: u32,
         fixed: bool,
     ) {
-        self.watch_with(graph, name, counter, capacity, fixed, STEADY);
+        let resource = graph.keep(counter);
+        let demand = Demand { name, resource, capacity, fixed, slack_eighths: STEADY, varies: false };
+        self.capacities.demands.borrow_mut().push(demand);
     }
 
-    /// As [`Self::watch`], with another share of room beyond what was needed: [`STEADY`] or [`UNSTEADY`].
-    pub fn watch_with(
+    /// As [`Self::watch`], of a list whose need depends on the order in which the device runs threads, with a share of room beyond what
+    /// was needed: [`STEADY`] or [`UNSTEADY`].
+    pub fn watch_varying(
         &self,
         graph: &mut Graph,
         name: &'static str,
         counter: &BufferHandle,
         capacity: u32,
-        fixed: bool,
         slack_eighths: u32,
     ) {
         let resource = graph.keep(counter);
-        let demand = Demand { name, resource, first_word: 0, capacity, fixed, slack_eighths };
+        let demand =
+            Demand { name, resource, first_word: 0, capacity, fixed: false, slack_eighths, varies: true };
         self.capacities.demands.borrow_mut().push(demand);
     }
 
@@ -178,6 +190,7 @@ impl Frame<'_> {
             capacity: *capacity,
             fixed: false,
             slack_eighths: STEADY,
+            varies: false,
         };
         self.capacities.demands.borrow_mut().extend(of.iter().enumerate().map(demand));
     }
@@ -208,7 +221,7 @@ mod tests {
     /// recorded as often as may be.
     #[test]
     fn what_was_given_room_settles() {
-        for slack_eighths in [STEADY, UNSTEADY] {
+        for (slack_eighths, varies) in [(STEADY, false), (STEADY, true), (UNSTEADY, true)] {
             for needed in [0, 1, 5_000, 133_822, 1 << 24] {
                 let demand = Demand {
                     name: "blocks",
@@ -217,6 +230,7 @@ mod tests {
                     capacity: 0,
                     fixed: false,
                     slack_eighths,
+                    varies,
                 };
                 let first = Capacities { known: Vec::new(), demands: RefCell::new(vec![demand]) };
                 let room = match first.next(&[counter(needed, needed.saturating_sub(1), false)]) {
@@ -242,6 +256,7 @@ mod tests {
             capacity,
             fixed,
             slack_eighths: STEADY,
+            varies: false,
         };
         let counted = demand(100, false).counted(90, 5);
         assert_eq!((counted.needed, counted.dropped), (u32::MAX, 5));
@@ -255,6 +270,24 @@ mod tests {
         // The edge: what fits to the last element, and what is one more.
         assert_eq!(demand(100, false).counted(100, 0).needed, 100);
         assert_eq!(demand(100, false).counted(101, 1).needed, 101);
+    }
+
+    /// What varies has room for more than what was counted by chance, also where that fits.
+    #[test]
+    fn what_varies_has_room_for_more() {
+        let demand = |varies| Demand {
+            name: "blocks",
+            resource: kept(),
+            first_word: 0,
+            capacity: 16,
+            fixed: false,
+            slack_eighths: UNSTEADY,
+            varies,
+        };
+        let of = |varies| Capacities { known: Vec::new(), demands: RefCell::new(vec![demand(varies)]) };
+        assert!(of(false).next(&[counter(8, 16, false)]).is_none());
+        let next = of(true).next(&[counter(8, 16, false)]).expect("room for more");
+        assert_eq!(next.known[0].1, 8 + 8 + SLACK / 8);
     }
 
     #[test]

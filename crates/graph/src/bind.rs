@@ -207,8 +207,12 @@ fn missing(pass: &PassNode, shader: &Shader, binding: &Binding, expected: &'stat
     }
 }
 
-/// Checks that some shader of the pass can write each slot that the pass declares as written.
+/// Checks that some shader of the pass can write each slot that the pass declares as written. A pass over a scene without draws has no
+/// shader and writes nothing.
 pub(crate) fn check_writes(pass: &PassNode, shaders: &[&Shader]) -> Result<(), GraphError> {
+    if shaders.is_empty() {
+        return Ok(());
+    }
     for slot in pass.slots.iter().filter(|slot| slot.intent == Intent::Write) {
         let mut found = shaders
             .iter()

@@ -23,7 +23,9 @@ use afterlight_techniques::{
     shader::Shader,
 };
 use afterlight_testkit::Need;
-use common::{Stage, compiled, compiled_with_header, image_of, params, psnr, source, wider};
+use common::{
+    Stage, compiled, compiled_variant, compiled_with_header, image_of, params, psnr, source, wider,
+};
 use glam::{DVec4, Vec3};
 
 /// The lists of `clustered` with everything kept.
@@ -572,21 +574,48 @@ fn a_sum_of_lists_that_begins_anew_is_told() {
     }
 }
 
-/// What is larger than the device takes is an error that names bytes. 20,000 lights that reach everything.
+/// Lists that are larger than the device binds are refused with their bytes, those that fit are not. All lights reach everything, so
+/// that entries are clusters times lights, counted by hand.
 #[test]
 fn lists_that_find_no_room_are_told() {
     let gpu = afterlight_testkit::gpu();
     let stage = Stage::new(&gpu, "builtin:colonnade?triangles=17000&texture=64");
-    let mut settings = stage.settings((320, 180), 20_000);
-    settings.lights = wider(&settings.lights, 1e4);
-    let limit = gpu.features().max_storage_buffer_range;
     let technique = find("clustered").unwrap();
-    match stage.try_prepare(technique, &settings, &params(technique, &[("cluster-px", "8")])) {
-        Err(error @ TechniqueError::TooLarge { .. }) => {
+    // Many clusters of few pixels: lists are long, and few lights are visited.
+    let params = params(technique, &[("cluster-px", "8"), ("slices", "256")]);
+    let with_lights = |count: u32| {
+        let settings = stage.settings((96, 54), count);
+        Settings { lights: wider(&settings.lights, 1e4), ..settings }
+    };
+    let counted = |lights: u32, shaders: &[Shader]| {
+        let settings = with_lights(lights);
+        let mut prepared = stage.prepare_shaders(technique, &settings, &params, shaders.iter().cloned());
+        prepared.run().unwrap_or_else(|e| panic!("{e}"));
+        let counters = prepared.counters().unwrap_or_else(|e| panic!("{e}"));
+        assert!(counters.iter().all(|counter| counter.dropped == 0), "{lights} lights: {counters:?}");
+        let needed = |name: &str| counters.iter().find(|counter| counter.name == name).expect(name).needed;
+        (needed("clusters"), needed("cluster lights"))
+    };
+    let (clusters, entries) = counted(7, &[]);
+    assert!(clusters > 100 && entries == 7 * clusters, "{entries} entries of {clusters} clusters");
+    let name = "lights/cells/assign.comp";
+    let fewer = ("atomicAdd(entries_needed, count)", "atomicAdd(entries_needed, count - 1u)");
+    let fewer = compiled_variant(name, &format!("{name}.glsl"), &[fewer]);
+    assert_ne!(counted(7, &[fewer]), (clusters, entries), "a light that is not counted goes unseen");
+
+    let limit = gpu.features().max_storage_buffer_range;
+    let full = u32::try_from(limit / (4 * u64::from(clusters))).expect("lights");
+    // With room for an eighth more.
+    let (_, entries) = counted(full / 4 * 3, &[]);
+    assert_eq!(entries, full / 4 * 3 * clusters);
+    match stage.try_prepare(technique, &with_lights(full + 1), &params) {
+        Err(ref error @ TechniqueError::TooLarge { found, limit: told, .. }) => {
             println!("{error}");
             assert!(error.to_string().contains("bytes of the lists"), "{error}");
+            let bytes = 4 * u64::from(full + 1) * u64::from(clusters);
+            assert!(told == limit && (bytes..=bytes / 4 * 5).contains(&found), "{error}: {bytes} needed");
         }
         Err(error) => panic!("{error}"),
-        Ok(_) => assert!(limit > 1 << 30, "{limit} bytes hold every list"),
+        Ok(_) => panic!("{} lights of {clusters} clusters in {limit} bytes", full + 1),
     }
 }

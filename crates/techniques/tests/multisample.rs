@@ -7,9 +7,15 @@ use afterlight_techniques::{
     Params, Settings, Shadows, Technique, Transparency, find,
     graph::gpu,
     registry,
-    scene::{AlphaMode, Camera},
+    scene::{AlphaMode, Camera, LoadOptions, Scene, load_source},
+    shader::Shader,
 };
-use common::{Stage, covered, image_of, least_db, params, psnr};
+use common::{
+    Stage, compiled_variant, covered,
+    flat::{scene_of, unlit},
+    image_of, least_db, params, psnr, radiance_of,
+    ways::every_way,
+};
 use glam::Vec3;
 
 /// Least PSNR to `forward` at as many samples, dB (contract).
@@ -88,6 +94,28 @@ fn on_intersecting_triangles() {
     let gpu = afterlight_testkit::gpu();
     let stage = Stage::new(&gpu, "builtin:intersect");
     all_agree(&stage, &stage.settings((161, 91), 20), "intersect", 2);
+}
+
+/// Through one bucket for all triangles, whose look-ups and replacements meet all the time, frame after frame.
+#[test]
+fn through_one_bucket() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:intersect");
+    let technique = find("dais").unwrap();
+    for samples in counts(&gpu) {
+        let settings = Settings { samples, ..stage.settings((161, 91), 0) };
+        let reference = stage.image(find("forward").unwrap(), &settings);
+        let sets = [("fill", "cache"), ("cache-buckets", "1")];
+        let mut prepared = stage.prepare_with(technique, &settings, &params(technique, &sets));
+        for frame in 0..100 {
+            let db = psnr(&reference, &image_of(&mut prepared));
+            let counters = prepared.counters().unwrap_or_else(|e| panic!("{e}"));
+            assert!(
+                db >= MIN_PSNR_DB && counters.iter().all(|counter| counter.dropped == 0),
+                "{samples} samples, frame {frame}: {db:.2} dB to forward, {counters:?}"
+            );
+        }
+    }
 }
 
 #[test]
@@ -184,6 +212,144 @@ fn weights_sum_to_the_samples() {
         }
     }
 }
+
+/// Blades of two-sided unlit triangles that pass through each other, their colours of full and no red, green and blue: what a
+/// channel shows of a pixel is a number of samples.
+fn colored_blades(gpu: &gpu::Device) -> Stage {
+    let mut scene =
+        load_source("builtin:intersect", &LoadOptions::default()).unwrap_or_else(|e| panic!("{e}"));
+    scene.environment.background_radiance = Vec3::ZERO;
+    for (number, material) in scene.materials.iter_mut().enumerate() {
+        let channel = |bit: usize| if (number + 1) >> bit & 1 != 0 { 1.0 } else { 0.0 };
+        material.base_color_factor = [channel(0), channel(1), channel(2), 1.0];
+        material.unlit = true;
+    }
+    Stage::of(gpu, scene)
+}
+
+/// Pixels in which a channel shows another number of samples.
+fn weights_off(found: &[[f32; 4]], expected: &[[f32; 4]], samples: u32) -> usize {
+    let most = 0.25 / samples as f32;
+    let is_off = |(a, b): &(&[f32; 4], &[f32; 4])| (0..3).any(|c| (a[c] - b[c]).abs() > most);
+    found.iter().zip(expected).filter(is_off).count()
+}
+
+/// A surface's weight is the number of samples that show it, as `forward` finds them: a technique that gives a sample to another
+/// surface still sums to all samples, and its view of weights is black.
+#[test]
+fn weights_are_the_samples_that_show() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = colored_blades(&gpu);
+    for samples in counts(&gpu) {
+        let settings = Settings { samples, keep_hdr: true, ..stage.settings((161, 91), 0) };
+        let expected = stage.radiance(find("forward").unwrap(), &settings);
+        let weights = |technique: &dyn Technique, params: &Params, mutant: Option<Shader>| {
+            let mut prepared = stage.prepare_shaders(technique, &settings, params, mutant);
+            weights_off(&radiance_of(&mut prepared), &expected, samples)
+        };
+        for (technique, params, name) in every_way() {
+            if technique.info().samples.contains(&samples) {
+                let off = weights(technique, &params, None);
+                println!("{samples} samples: {name}: {off} pixels");
+                let most = if name.contains("visibility=compute") { COMPUTE_OFF } else { 0 };
+                assert!(off <= most, "{samples} samples: {name}: {off} pixels of other weights");
+            }
+        }
+        for (id, sets, variant, header, from, to) in MUTANTS {
+            let technique = find(id).unwrap();
+            let mutant = compiled_variant(variant, header, &[(from, to)]);
+            let off = weights(technique, &params(technique, sets), Some(mutant));
+            println!("{samples} samples: {id} {sets:?}, {to:?}: {off} pixels");
+            assert!(
+                off > 2 * COMPUTE_OFF + 20,
+                "{samples} samples: {id} {sets:?}: {to:?} lives: {off} pixels"
+            );
+        }
+    }
+}
+
+/// Pixels of 161 × 91 in which depths that are computed otherwise may decide between triangles that pass through each other.
+const COMPUTE_OFF: usize = 10;
+
+/// Ways to weigh surfaces wrongly, one for each way in which techniques hold them: technique and parameters, variant, and what is
+/// replaced in which of its headers.
+type Mutant = (
+    &'static str,
+    &'static [(&'static str, &'static str)],
+    &'static str,
+    &'static str,
+    &'static str,
+    &'static str,
+);
+const SAME_TRIANGLE: (&str, &str, &str) =
+    ("surfaces/visible/triangles.glsl", " && sample_triangle(pixel, i) == v.id", "");
+const MUTANTS: &[Mutant] = &[
+    (
+        "dais",
+        &[("visibility", "raster")],
+        "dais/shade.comp",
+        SAME_TRIANGLE.0,
+        SAME_TRIANGLE.1,
+        SAME_TRIANGLE.2,
+    ),
+    (
+        "dais",
+        &[("visibility", "compute")],
+        "dais/shade.comp#keys",
+        SAME_TRIANGLE.0,
+        SAME_TRIANGLE.1,
+        SAME_TRIANGLE.2,
+    ),
+    (
+        "dais",
+        &[("fill", "cache")],
+        "dais/shade.comp#refs",
+        "dais/source_dais.glsl",
+        "(name >> 24 | first) & source_mask",
+        "source_mask",
+    ),
+    (
+        "dais-multirate",
+        &[("visibility", "raster")],
+        "dais/shade.comp",
+        SAME_TRIANGLE.0,
+        SAME_TRIANGLE.1,
+        SAME_TRIANGLE.2,
+    ),
+    ("deferred-dedup", &[], "deferred_dedup/shade.comp", SAME_TRIANGLE.0, SAME_TRIANGLE.1, SAME_TRIANGLE.2),
+    (
+        "gbuffer-list",
+        &[("visibility", "raster")],
+        "gbuffer_list/fill.comp",
+        SAME_TRIANGLE.0,
+        SAME_TRIANGLE.1,
+        SAME_TRIANGLE.2,
+    ),
+    (
+        "gbuffer-list",
+        &[("fill", "raster")],
+        "gbuffer_list/fill.frag",
+        "gbuffer_list/fill.frag.glsl",
+        "uint mask = uint(gl_SampleMaskIn[0]);",
+        "uint mask = uint(gl_SampleMaskIn[0]) | 1u;",
+    ),
+    (
+        "dais-list",
+        &[],
+        "dais_list/fill.frag",
+        "dais_list/fill.frag.glsl",
+        "uint mask = uint(gl_SampleMaskIn[0]);",
+        "uint mask = uint(gl_SampleMaskIn[0]) | 1u;",
+    ),
+    (
+        "deferred-ssaa",
+        &[],
+        "deferred_ssaa/shade.comp",
+        "surfaces/samples/source_samples.glsl",
+        "texelFetch(gbuffer_base_color, source_pixel, int(i))",
+        "texelFetch(gbuffer_base_color, source_pixel, 0)",
+    ),
+];
 
 /// Lists with room for all equal what holds every sample, whatever the layout of their blocks.
 #[test]
@@ -323,6 +489,79 @@ fn a_bound_on_nodes_is_told() {
             image.pixels.chunks_exact(4).filter(|p| p[..3] == [255; 3]).count()
         };
         assert!(bright("0") <= bright("auto"), "the background shows through dropped samples");
+    }
+}
+
+/// Bars side by side, a triangle and a colour each, that share no pixel, before a bright background.
+fn bars() -> Scene {
+    let bar = |i: u8| {
+        let x = -2.5 + 0.21 * f32::from(i);
+        let corners =
+            [Vec3::new(x, -2.0, 0.0), Vec3::new(x + 0.14, -2.0, 0.0), Vec3::new(x + 0.07, 9.0, 0.0)];
+        (corners, [40 + 8 * i, 20 + 90 * (i % 3), 250 - 8 * i])
+    };
+    let mut scene = scene_of(&[(unlit(AlphaMode::Opaque), (0..24).map(bar).collect())], Vec3::Z * 3.0);
+    scene.environment.background_radiance = Vec3::new(0.1, 1.0, 0.1);
+    scene
+}
+
+/// Triangles that find no room in the triangle buffer are told, and no other triangle shows in their place: what shows is the
+/// triangle itself, or the background.
+#[test]
+fn triangles_without_room_are_told_and_no_other_shows() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::of(&gpu, bars());
+    let mut nothing = stage.settings((8, 8), 0);
+    nothing.camera = Camera::look_at("away", Vec3::Z * 3.0, Vec3::Z * 9.0, 0.9, 0.1);
+    let empty = stage.image(find("forward").unwrap(), &nothing);
+    // There is room for eight, and what is needed grows with what is given: the last recording is short as well.
+    let shortage = (
+        "uint place = atomicAdd(triangles_needed, 1u);",
+        "uint place = atomicAdd(triangles_needed, 1u);
+    if (place >= 8u) {
+        place = max(place, TRIANGLE_CAPACITY);
+        atomicMax(triangles_needed, TRIANGLE_CAPACITY + 8u);
+    }",
+    );
+    let tessellated = gpu.features().tessellation_shader && gpu.features().geometry_shader;
+    for (id, sets, shader, samples, tessellate) in [
+        ("dais", &[("fill", "cache")][..], "dais/fill.frag", 1, false),
+        ("dais", &[("fill", "cache"), ("reference-bits", "8")], "dais/fill.frag#wide", 1, false),
+        // Of tessellated bars several triangles share a pixel, some of them with room.
+        ("dais", &[], "dais/fill.frag#whole", 4, true),
+        ("dais", &[("reference-bits", "8")], "dais/fill.frag#whole-wide", 4, true),
+        ("dais-list", &[], "dais_list/fill.frag#whole", 4, true),
+    ] {
+        if tessellate && !tessellated {
+            println!("skipped: {id} {sets:?} with tessellation, which the device lacks");
+            continue;
+        }
+        let mut settings = Settings { samples, ..stage.settings((161, 91), 0) };
+        if tessellate {
+            settings = settings.with_effects(|effects| effects.tessellation.edge_px = Some(64.0));
+        }
+        let technique = find(id).unwrap();
+        let right = image_of(&mut stage.prepare_with(technique, &settings, &params(technique, sets)));
+        let mutant = compiled_variant(shader, "dais/memoize.glsl", &[shortage]);
+        let mut prepared = stage.prepare_shaders(technique, &settings, &params(technique, sets), [mutant]);
+        let short = image_of(&mut prepared);
+        let counters = prepared.counters().unwrap_or_else(|e| panic!("{e}"));
+        let counter = counters.iter().find(|c| c.name == "triangles").expect("triangles are counted");
+        assert!(counter.dropped > 0, "{id} {sets:?}: {counter:?}");
+        let alike = |a: &[u8], b: &[u8]| a.iter().zip(b).all(|(a, b)| a.abs_diff(*b) <= 2);
+        let background = &empty.pixels[..4];
+        let pairs = short.pixels.chunks_exact(4).zip(right.pixels.chunks_exact(4));
+        let bars: Vec<_> = pairs.filter(|(_, right)| !alike(right, background)).collect();
+        let (shown, hidden): (Vec<_>, Vec<_>) =
+            bars.into_iter().partition(|(short, right)| alike(short, right));
+        let others = hidden.iter().filter(|(short, _)| !alike(short, background)).count();
+        println!(
+            "{id} {sets:?}, {samples} samples: {} shown, {} hidden, {others} others",
+            shown.len(),
+            hidden.len()
+        );
+        assert!(!shown.is_empty() && hidden.len() > 500, "{id} {sets:?}: the shortage shows too little");
+        assert_eq!(others, 0, "{id} {sets:?}, {samples} samples: pixels show another triangle");
     }
 }
 

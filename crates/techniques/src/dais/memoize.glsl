@@ -1,11 +1,19 @@
 // The memoization cache: triangle to its place in the triangle buffer (Schied and Dachsbacher 2015, section 4.1; Liktor and
-// Dachsbacher 2012). Every fragment looks its triangle up; one that finds nothing takes the bucket's lock, a slot of the
-// triangle buffer, and stores the triangle for the derivative pass: its ID in the first word of its record, or, with
-// WHOLE_TRIANGLE, whose IDs are numbers that lead nowhere, its vertices in the record. Needs draw_material.
+// Dachsbacher 2012). Every fragment looks its triangle up; one that finds nothing locks the bucket, takes a slot of the triangle
+// buffer, and stores the triangle for the derivative pass: its ID in the first word of its record, or, with WHOLE_TRIANGLE, whose
+// IDs are numbers that lead nowhere, its vertices in the record. Needs draw_material.
+//
+// An entry is a place alone. Which triangle stands there is asked of the place itself, and no place is given twice in a frame: what an
+// entry leads to holds, whoever replaces the entry meanwhile. (With a triangle ID and its place in two words of the entry a
+// look-up could read the ID of one triangle and the place of another, though it read the ID again afterwards: the triangle may have
+// left the bucket and come back in between.) Look-ups therefore need no lock. Who stores a triangle takes one all the same,
+// so that the fragments of a new triangle, which come at once, store it once. All orders of these steps are tried by
+// tests/interleavings/cache.rs, which changes with this file.
 //
 // No lock can hang. A fragment that fails to take a lock does not wait inside the loop's turn but polls again, at most POLLS times;
 // one that takes it lets go within the same turn, whatever the other lanes of its subgroup do. After that the triangle is
-// stored once more, which costs memory and nothing else.
+// stored and cached without the lock, so that a fragment that is suspended with it costs others a record each, not one for every
+// fragment that comes meanwhile (thousands on a busy CPU).
 #ifndef AFTERLIGHT_MEMOIZE
 #define AFTERLIGHT_MEMOIZE
 #include "surfaces/triangles/record.glsl"
@@ -14,14 +22,17 @@
 #include "surfaces/geometry/whole_triangle.glsl"
 #endif
 
-// Triangle ID and its place, two entries in each bucket. The place is written first and the ID last; while an entry is replaced its ID is
-// NO_ID. It is volatile because a look-up reads the ID twice: a compiler that merged the two reads would return another triangle's
-// place (32 dB on lavapipe).
-layout(set = 0, binding = 10, scalar) coherent volatile buffer CacheEntries {
-    uvec2 cache_entries[];
+// Two entries in each bucket, the newer first: 0; a place plus one; or, of a triangle that found no place, NO_PLACE and its ID's lower
+// bits.
+layout(set = 0, binding = 10, scalar) coherent buffer CacheEntries {
+    uint cache_entries[];
 };
 layout(set = 0, binding = 11, scalar) coherent buffer CacheLocks {
     uint cache_locks[];
+};
+// The triangle of each place: written once, before an entry leads to it. What is left of earlier frames is never asked for.
+layout(set = 0, binding = 18, scalar) coherent buffer StoredIds {
+    uint stored_ids[];
 };
 layout(set = 0, binding = 12, scalar) buffer TriangleCount {
     uint triangles_needed;
@@ -34,27 +45,13 @@ layout(constant_id = 11) const uint TRIANGLE_CAPACITY = 0u;
 layout(constant_id = 12) const uint CACHE_BUCKETS = 8192u;
 layout(constant_id = 13) const uint POLLS = 32u;
 
+const uint NO_PLACE = 0x80000000u;      // set in an entry
+const uint NO_RECORD = 0xfffffffeu;     // the place of a triangle that found none: behind all places
 const uint NOT_CACHED = 0xffffffffu;
-const uint NO_ID = 0u;      // value of the cleared cache; IDs are stored plus one
 
 // A hash that spreads neighbouring triangles, which are drawn at the same time, over the buckets.
 uint bucket_of(uint id) {
     return (id * 2654435761u >> 16) % CACHE_BUCKETS;
-}
-
-uint look_up(uint bucket, uint id) {
-    for (uint i = bucket * 2u; i < bucket * 2u + 2u; ++i) {
-        if (cache_entries[i].x == id + 1u) {
-            memoryBarrierBuffer();
-            uint place = cache_entries[i].y;
-            memoryBarrierBuffer();
-            // The entry has not changed in between, so the place belongs to this ID.
-            if (cache_entries[i].x == id + 1u) {
-                return place;
-            }
-        }
-    }
-    return NOT_CACHED;
 }
 
 #ifdef WHOLE_TRIANGLE
@@ -87,17 +84,44 @@ void store_vertices(uint record) {
 }
 #endif
 
+// Gives a triangle a place, or counts it as dropped.
 uint store_triangle(uint id) {
     uint place = atomicAdd(triangles_needed, 1u);
-    if (place < TRIANGLE_CAPACITY) {
-#ifdef WHOLE_TRIANGLE
-        store_vertices(place * RECORD_WORDS);
-#else
-        triangle_buffer[place * RECORD_WORDS] = id;
-#endif
-    } else {
+    if (place >= TRIANGLE_CAPACITY) {
         atomicAdd(triangles_dropped, 1u);
+        return NO_RECORD;
     }
+#ifdef WHOLE_TRIANGLE
+    store_vertices(place * RECORD_WORDS);
+#else
+    triangle_buffer[place * RECORD_WORDS] = id;
+#endif
+    return place;
+}
+
+// The place to which an entry leads, if it is the triangle's own.
+uint place_of_entry(uint entry, uint id) {
+    if ((entry & NO_PLACE) != 0u) {
+        return (entry ^ id) << 1 == 0u ? NO_RECORD : NOT_CACHED;
+    }
+    memoryBarrierBuffer();  // the ID is read after the entry
+    return entry != 0u && stored_ids[entry - 1u] == id ? entry - 1u : NOT_CACHED;
+}
+
+uint look_up(uint bucket, uint id) {
+    uint place = place_of_entry(cache_entries[bucket * 2u], id);
+    return place != NOT_CACHED ? place : place_of_entry(cache_entries[bucket * 2u + 1u], id);
+}
+
+// Stores a triangle and puts it first in its bucket: the newer entry becomes the older, which leaves it.
+uint store_and_cache(uint bucket, uint id) {
+    uint place = store_triangle(id);
+    if (place != NO_RECORD) {
+        stored_ids[place] = id;
+    }
+    memoryBarrierBuffer();  // who sees the entry sees the ID
+    uint entry = place != NO_RECORD ? place + 1u : NO_PLACE | id;
+    cache_entries[bucket * 2u + 1u] = atomicExchange(cache_entries[bucket * 2u], entry);
     return place;
 }
 
@@ -109,29 +133,18 @@ uint memoized(uint id) {
             return place;
         }
         if (atomicCompSwap(cache_locks[bucket], 0u, 1u) == 0u) {
+            memoryBarrierBuffer();
             // Another fragment may have stored the triangle between the look-up and taking the lock.
             place = look_up(bucket, id);
             if (place == NOT_CACHED) {
-                place = store_triangle(id);
-                // Replaces the older entry: the first entry moves into the second.
-                uvec2 older = cache_entries[bucket * 2u];
-                cache_entries[bucket * 2u + 1u].x = NO_ID;
-                memoryBarrierBuffer();
-                cache_entries[bucket * 2u + 1u].y = older.y;
-                memoryBarrierBuffer();
-                cache_entries[bucket * 2u + 1u].x = older.x;
-                cache_entries[bucket * 2u].x = NO_ID;
-                memoryBarrierBuffer();
-                cache_entries[bucket * 2u].y = place;
-                memoryBarrierBuffer();
-                cache_entries[bucket * 2u].x = id + 1u;
+                place = store_and_cache(bucket, id);
             }
-            memoryBarrierBuffer();
+            memoryBarrierBuffer();  // who takes the lock next sees the entry
             atomicExchange(cache_locks[bucket], 0u);
             return place;
         }
     }
-    return store_triangle(id);
+    return store_and_cache(bucket, id);
 }
 
 // The number that identifies the fragment's triangle.

@@ -28,6 +28,7 @@ use afterlight_stages::{
     },
     surfaces::shade::SurfaceSource,
     surfaces::{
+        claims,
         compute_raster::{ComputeRasterParams, Visibility},
         shade,
         triangles::{self, RecordParams, Records},
@@ -43,8 +44,8 @@ pub static TECHNIQUE: Dais = Dais;
 /// See the module.
 pub struct Dais;
 
-/// Most triangles that a visibility sample's 32 bits tell apart; all ones is the background.
-const REFERENCES_MAX: u32 = u32::MAX - 1;
+/// Most triangles that the cache and a visibility sample's 32 bits tell apart: the highest bit marks entries without a place.
+const REFERENCES_MAX: u32 = (1 << 31) - 1;
 /// Most samples of a visibility sample's coverage mask.
 const COVERAGE_SAMPLES_MAX: u32 = 8;
 /// Polls of a locked bucket before a triangle is stored once more. The lock is held for some tens of instructions.
@@ -54,25 +55,28 @@ const POLLS: u32 = 32;
 pub(crate) struct Cache {
     entries: BufferHandle,
     locks: BufferHandle,
+    stored_ids: BufferHandle,
     buckets: u32,
 }
 
 impl Cache {
-    /// Declares an empty cache.
-    pub fn new(graph: &mut Graph, technique: &str, CacheParams { buckets }: CacheParams) -> Self {
-        let entries = graph.buffer(
-            &format!("{technique}/cache entries"),
-            BufferRole::MemoizationCache,
-            16 * u64::from(buckets),
-        );
-        let locks = graph.buffer(
-            &format!("{technique}/cache locks"),
-            BufferRole::MemoizationCache,
-            4 * u64::from(buckets),
-        );
+    /// Declares an empty cache for triangles that are stored in a list.
+    pub fn new(
+        graph: &mut Graph,
+        technique: &str,
+        CacheParams { buckets }: CacheParams,
+        list: &triangles::List,
+    ) -> Self {
+        let mut buffer = |part: &str, words: u64| {
+            graph.buffer(&format!("{technique}/{part}"), BufferRole::MemoizationCache, 4 * words)
+        };
+        let entries = buffer("cache entries", 2 * u64::from(buckets));
+        let locks = buffer("cache locks", u64::from(buckets));
+        let stored_ids = buffer("stored ids", u64::from(list.capacity.max(1)));
         Self {
             entries: graph.clear_buffer(&format!("{technique}/clear cache"), PassRole::Geometry, entries, 0),
             locks: graph.clear_buffer(&format!("{technique}/clear locks"), PassRole::Geometry, locks, 0),
+            stored_ids,
             buckets,
         }
     }
@@ -88,7 +92,8 @@ impl Cache {
     /// Binds it to the pass whose fragments store triangles.
     pub fn written_by(self, pass: &mut RasterPass<'_>) -> Self {
         let entries = pass.write("CacheEntries", self.entries);
-        Self { entries, locks: pass.write("CacheLocks", self.locks), ..self }
+        let locks = pass.write("CacheLocks", self.locks);
+        Self { entries, locks, stored_ids: pass.write("StoredIds", self.stored_ids), ..self }
     }
 }
 
@@ -278,21 +283,31 @@ fn record_cached(
     let references = name(if wide { "wide references" } else { "references" });
     let references =
         graph.image(&references, BufferRole::Visibility, frame.multisampled_info(vk::Format::R8G8B8A8_UNORM));
-    let depth =
-        graph.image(&name("depth"), BufferRole::Depth, frame.multisampled_info(vk::Format::D32_SFLOAT));
-    let cache = Cache::new(graph, technique, params.cache);
+    let depth = graph.image(
+        &name("depth"),
+        BufferRole::Depth,
+        frame.multisampled_info(frame.depth_stencil_format()),
+    );
     let list = triangles::List::new(graph, frame, technique, records, REFERENCES_MAX)?;
+    let cache = Cache::new(graph, technique, params.cache, &list);
     let tags = if wide { &["wide"][..] } else { &[] };
     let depth_only = depth_surfaces(frame)?;
     let mut fill = FillPass::new(graph, frame, technique, "dais/fill.frag", tags)?;
     fill.surfaces.constants = cache.constants(&list);
+    // Wide references are also for devices that do not tell what a fragment covers after the depth test: there it can claim nothing.
+    let mut claims = None;
+    if !wide {
+        fill.surfaces.constants.push(("SAMPLES".to_owned(), frame.samples));
+        claims = claims::claims(graph, frame, technique, frame.samples);
+    }
 
     let depth = depth_only.fill_depth(graph, frame, (&name("depth"), PassRole::DepthPrepass), depth);
 
     let mut pass = graph.raster(&name("fill"), PassRole::Geometry);
     frame.bind_scene(&mut pass);
     let references = pass.color(references, Load::Clear(NO_TRIANGLE_RGBA8));
-    pass.depth_read_only(&depth);
+    let depth = pass.stencil(depth, Load::Keep);
+    let _claims = claims.map(|claims| pass.write("SampleClaims", claims));
     let _cache = cache.written_by(&mut pass);
     let list = list.written_by(&mut pass);
     fill.draw(frame, &mut pass);

@@ -3,7 +3,9 @@
 use afterlight_graph::{BufferHandle, BufferRole, DepthTest, Graph, PassRole, RasterPass};
 
 use afterlight_frame::{DrawCommands, Frame, TechniqueError};
-use afterlight_stages::surfaces::geometry::SceneDraws;
+use afterlight_stages::surfaces::{
+    claims::NOT_TAKEN, depth_first::FIRST_FRAGMENT, geometry::SceneDraws,
+};
 
 /// What the first pass draws: depth alone. In tessellated frames both passes have a geometry shader, so that their depths are
 /// equal.
@@ -15,8 +17,9 @@ pub(crate) fn depth_surfaces(frame: &Frame<'_>) -> Result<SceneDraws, TechniqueE
     if frame.tessellate_px.is_some() { depth.through_geometry(frame) } else { Ok(depth) }
 }
 
-/// What the second pass draws, with an equal test: fragments that store their triangles. In tessellated frames its geometry shader
-/// numbers triangles and hands them on whole.
+/// What the second pass draws, with an equal test: fragments that store their triangles. Of fragments of one depth a bit of stencil,
+/// which the depth pass has cleared, lets the first pass; masked surfaces keep off what opaque ones have. In tessellated frames its
+/// geometry shader numbers triangles and hands them on whole.
 pub(crate) struct FillPass {
     /// Fragments that store their triangles.
     pub surfaces: SceneDraws,
@@ -45,7 +48,7 @@ impl FillPass {
                 ("surfaces/geometry/surface.vert#position", Some(&opaque)),
                 ("surfaces/geometry/surface.vert#uv", &masked),
             )?;
-            return Ok(Self { surfaces: fill.depth(DepthTest::EQUAL), numbers: None });
+            return Ok(Self { surfaces: equal_and_first(fill), numbers: None });
         }
         let fill = SceneDraws::shaded(frame, &opaque, &masked)?.whole_triangles(frame, technique)?;
         let numbers = graph.buffer(&format!("{technique}/triangle numbers"), BufferRole::Counters, 4);
@@ -55,7 +58,7 @@ impl FillPass {
             numbers,
             0,
         );
-        Ok(Self { surfaces: fill.depth(DepthTest::EQUAL), numbers: Some(numbers) })
+        Ok(Self { surfaces: equal_and_first(fill), numbers: Some(numbers) })
     }
 
     /// Binds what the pass counts triangles with and adds its draws.
@@ -75,6 +78,13 @@ impl FillPass {
         }
         self.surfaces
     }
+}
+
+/// With an equal test, by which the first fragment of a sample passes and no other.
+fn equal_and_first(surfaces: SceneDraws) -> SceneDraws {
+    let mut surfaces = surfaces.depth(DepthTest::EQUAL).stencil(FIRST_FRAGMENT, 1);
+    surfaces.masked_stencil = Some(NOT_TAKEN);
+    surfaces
 }
 
 /// Name of a shader's variant.

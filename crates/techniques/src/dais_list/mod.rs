@@ -18,11 +18,9 @@ use afterlight_frame::{
 use afterlight_shader::Shader;
 use afterlight_stages::{
     lights::{cells, step},
-    surfaces::claims,
     surfaces::shade::SurfaceSource,
     surfaces::{
-        claims::NOT_TAKEN,
-        depth_first::FIRST_FRAGMENT,
+        claims,
         triangles::{self, RecordParams},
     },
 };
@@ -33,9 +31,9 @@ pub static TECHNIQUE: DaisList = DaisList;
 /// See the module.
 pub struct DaisList;
 
-/// Most triangles that the reference of an entry tells apart.
+/// Most triangles that the reference of an entry tells apart; all ones is a triangle without a place.
 const fn references_max(samples: u32) -> u32 {
-    1 << if samples > 8 { 27 } else { 28 }
+    (1 << if samples > 8 { 27 } else { 28 }) - 1
 }
 
 /// Checks that references tell the triangles of so many draws apart.
@@ -141,13 +139,15 @@ impl Lists {
             let buffer = graph.buffer(&format!("dais-list/{name}"), role, bytes);
             graph.clear_buffer(&format!("dais-list/clear {name}"), PassRole::Geometry, buffer, 0)
         };
+        let node_bytes = 8 * u64::from(capacity.max(1));
+        let nodes = match frame.scene.draw_count() {
+            // No fragment writes a node, and no head leads to one; what is read must have been written all the same.
+            0 => zeroed(graph, "nodes", BufferRole::SurfaceListNodes, node_bytes),
+            _ => graph.buffer("dais-list/nodes", BufferRole::SurfaceListNodes, node_bytes),
+        };
         Ok(Self {
             heads: zeroed(graph, "heads", BufferRole::SurfaceListHeads, 4 * pixels),
-            nodes: graph.buffer(
-                "dais-list/nodes",
-                BufferRole::SurfaceListNodes,
-                8 * u64::from(capacity.max(1)),
-            ),
+            nodes,
             node_count: zeroed(graph, "node count", BufferRole::SurfaceListNodes, 8),
             // Nobody asks what was dropped where nothing can be.
             drops: zeroed(
@@ -205,8 +205,8 @@ impl Triangles {
     ) -> Result<Self, TechniqueError> {
         let most = references_max(frame.samples);
         if frame.tessellate_px.is_some() {
-            let cache = Cache::new(graph, INFO.id, cache);
-            return Ok(Self::Listed { cache, list: triangles::List::new(graph, frame, INFO.id, records, most)? });
+            let list = triangles::List::new(graph, frame, INFO.id, records, most)?;
+            return Ok(Self::Listed { cache: Cache::new(graph, INFO.id, cache, &list), list });
         }
         check_draws(frame.scene.draw_count() as u64, most)?;
         Ok(Self::Marked(triangles::bits(graph, frame, INFO.id, 0)))
@@ -317,8 +317,6 @@ impl Band {
     ) -> Result<(ImageHandle, Lists, Triangles), TechniqueError> {
         let mut fill = FillPass::new(graph, frame, INFO.id, "dais_list/fill.frag", &[])?;
         let surfaces = &mut fill.surfaces;
-        (surfaces.stencil, surfaces.stencil_reference) = (Some(FIRST_FRAGMENT), 1);
-        surfaces.masked_stencil = Some(NOT_TAKEN);
         surfaces.constants = triangles.constants();
         let bounded = u32::from(lists.bounded);
         for (name, value) in

@@ -13,8 +13,11 @@
 const uint ENTRY = 0x80000000u;
 const uint REFERENCE_BITS = SAMPLES > 8u ? 27u : 28u;
 
+// A reference that no triangle has, for one that found no place.
+const uint NO_REFERENCE = (1u << REFERENCE_BITS) - 1u;
+
 uint list_entry(uint reference, uint samples) {
-    return ENTRY | (samples - 1u) << REFERENCE_BITS | reference;
+    return ENTRY | (samples - 1u) << REFERENCE_BITS | min(reference, NO_REFERENCE);
 }
 
 uint entry_reference(uint entry) {

@@ -21,18 +21,10 @@ layout(constant_id = 15) const uint BOUNDED = 0u;
 
 ivec2 source_pixel;
 uint source_link;           // the rest of the list, in the format of a head
-uint source_sum;
-uint source_background;     // samples without a surface
+uint source_background;     // samples without a surface: those that no entry so far has
 
 uint pixel_number(ivec2 pixel) {
     return uint(pixel.y) * frame.size_px.x + uint(pixel.x);
-}
-
-void source_begin(ivec2 pixel) {
-    source_pixel = pixel;
-    source_link = heads[pixel_number(pixel)];
-    source_sum = 0u;
-    source_background = 0u;
 }
 
 // Samples that were dropped because no node was left must not count as background.
@@ -40,12 +32,17 @@ uint dropped_samples(uint pixel) {
     return BOUNDED != 0u ? sample_drops[pixel / 4u] >> pixel % 4u * 8u & 0xffu : 0u;
 }
 
+void source_begin(ivec2 pixel) {
+    source_pixel = pixel;
+    source_link = heads[pixel_number(pixel)];
+    source_background = SAMPLES - min(dropped_samples(pixel_number(pixel)), SAMPLES);
+}
+
 // The next triangle of the pixel, by its reference, and its samples.
 bool source_next_triangle(out uint name, out uint weight) {
     weight = 0u;
     name = NO_TRIANGLE;
     if (source_link == 0u) {
-        source_background = SAMPLES - min(source_sum + dropped_samples(pixel_number(source_pixel)), SAMPLES);
         return false;
     }
     uint entry = source_link;
@@ -57,7 +54,7 @@ bool source_next_triangle(out uint name, out uint weight) {
     }
     name = entry_reference(entry);
     weight = entry_samples(entry);
-    source_sum += weight;
+    source_background -= min(weight, source_background);
     return true;
 }
 

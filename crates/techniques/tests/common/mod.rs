@@ -20,6 +20,9 @@ use afterlight_techniques::{
 };
 use glam::Vec3;
 
+pub mod flat;
+pub mod ways;
+
 /// A scene on the device.
 pub struct Stage {
     pub device: gpu::Device,
@@ -276,6 +279,37 @@ pub fn variant_with_header(name: &str, header: &str, replaced: &[(&str, &str)]) 
         let compiler = Compiler::new().override_dir(changed).include_dir(techniques).include_dir(stages);
         compiler.compile(&variant).unwrap_or_else(|e| panic!("{e}")).shader
     })
+}
+
+/// Compiles a variant by its full name, as its `variants.txt` says, with parts of a header's or a source's text replaced.
+pub fn compiled_variant(name: &str, header: &str, replaced: &[(&str, &str)]) -> Shader {
+    let mut variant = variant(name);
+    in_temporary_folder(|changed| {
+        let written = changed.join(header);
+        std::fs::create_dir_all(written.parent().expect("a folder")).expect("a temporary folder");
+        let path = source(header);
+        std::fs::write(&written, replaced_text(&path, replaced)).expect("a file in the temporary folder");
+        if variant.path == path {
+            variant.path = written;
+        } else if variant.source.as_ref() == Some(&path) {
+            variant.source = Some(written);
+        }
+        let [techniques, stages, _] = folders();
+        let compiler = Compiler::new().override_dir(changed).include_dir(techniques).include_dir(stages);
+        compiler.compile(&variant).unwrap_or_else(|e| panic!("{e}")).shader
+    })
+}
+
+/// A variant of a technique or a stage by its full name.
+fn variant(name: &str) -> manifest::Variant {
+    let (prefix, _) = name.rsplit_once('/').expect("a folder");
+    let [techniques, stages, _] = folders();
+    let folder =
+        [&techniques, &stages].map(|root| root.join(prefix)).into_iter().find(|folder| folder.is_dir());
+    let folder = folder.unwrap_or_else(|| panic!("{name}: found no folder {prefix}"));
+    let variants = manifest::read(prefix, &folder, &[techniques, stages]).unwrap_or_else(|e| panic!("{e}"));
+    let variant = variants.into_iter().find(|variant| variant.name == name);
+    variant.unwrap_or_else(|| panic!("{name}: found no such variant"))
 }
 
 /// A folder for one call: tests of one process compile at the same time.

@@ -97,8 +97,15 @@ void find_frame(uint record, vec2 from_anchor_px, vec2 pixel_center, float w, ui
     }
 }
 
-// First word of a record. In a frame that has more triangles than room, which is recorded again, those without a place show the
-// last.
+// Records that there is room for. The buffer may be longer: its memory is rounded up.
+layout(constant_id = 25) const uint RECORD_CAPACITY = 0u;
+
+// Whether a triangle found room. In a frame that has more triangles than room, some have no record.
+bool has_record(uint index) {
+    return index < RECORD_CAPACITY;
+}
+
+// First word of a record; of one that is not there, that of the last.
 uint record_at(uint index) {
     return min(index, uint(triangle_buffer.length()) / RECORD_WORDS - 1u) * RECORD_WORDS;
 }

@@ -101,6 +101,7 @@ impl Records {
     pub fn bind(&self, pass: &mut (impl SourceSlots + ?Sized)) {
         pass.read_buffer("TriangleBuffer", &self.words);
         set_constants(pass, self.layout.constants());
+        set_constants(pass, [("RECORD_CAPACITY", self.capacity)]);
     }
 }
 
@@ -208,7 +209,7 @@ impl List {
         pass.finish();
         // The triangles of tessellation are mostly small: hardly any is stored twice.
         let slack = if frame.tessellate_px.is_some() { capacity::STEADY } else { capacity::UNSTEADY };
-        frame.watch_with(graph, "triangles", &self.count, self.capacity, false, slack);
+        frame.watch_varying(graph, "triangles", &self.count, self.capacity, slack);
         Ok(Records { words, layout: self.layout, ids, capacity: self.capacity })
     }
 }
