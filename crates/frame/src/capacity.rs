@@ -159,7 +159,8 @@ impl Frame<'_> {
         fixed: bool,
     ) {
         let resource = graph.keep(counter);
-        let demand = Demand { name, resource, capacity, fixed, slack_eighths: STEADY, varies: false };
+        let demand =
+            Demand { name, resource, first_word: 0, capacity, fixed, slack_eighths: STEADY, varies: false };
         self.capacities.demands.borrow_mut().push(demand);
     }
 

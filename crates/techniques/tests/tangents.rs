@@ -154,7 +154,7 @@ fn soup(case: Case, seed: u64) -> Scene {
         });
     }
     scene.indices = (0..CORNERS).collect();
-    scene.nodes = vec![Node { name: String::new(), parent: None, local: Affine3A::IDENTITY }];
+    scene.nodes = vec![Node { name: String::new(), parent: None, local: glam::DAffine3::IDENTITY }];
     scene
 }
 
