@@ -331,6 +331,20 @@ mod tests {
         }
     }
 
+    /// A scene far from its file's origin has the same views, in words that lead to the same places.
+    #[test]
+    fn views_of_a_far_scene_are_named_in_its_coordinates() {
+        let near = scene("builtin:spheres?segments=8");
+        let far = Scene { origin_file: DVec3::new(1_400_000.3, 35.2, -900_000.6), ..near.clone() };
+        for index in 0..200 {
+            let [a, b] = [&near, &far].map(|scene| {
+                let view = draw(&Stage::of(scene), 5, index, &[1], &Fixed::default());
+                camera::select(scene, view.spec.camera.as_deref()).expect("a camera").world_from_view
+            });
+            assert!(a.abs_diff_eq(b, 1e-5), "view {index}: {a} {b}");
+        }
+    }
+
     #[test]
     fn an_empty_scene_has_views() {
         let stage = Stage::of(&Scene::default());
