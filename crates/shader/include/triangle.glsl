@@ -42,7 +42,8 @@ Barycentrics barycentrics_at(vec2 ndc, vec3 p0, vec3 p1, vec3 p2) {   // p: clip
     vec2 pixel_ndc = 2.0 / vec2(frame.size_px);
     float sum = b.x + b.y + b.z;
     Barycentrics r;
-    r.counter_clockwise = sum < 0.0;
+    // The sum times the distance at the pixel: the same at every pixel, also where the triangle's plane has ended before it, at the horizon.
+    r.counter_clockwise = dot(b, w) < 0.0;
     float inv = 1.0 / sum;
     r.at = b * inv;
     r.ddx = (bx - r.at * (bx.x + bx.y + bx.z)) * (inv * pixel_ndc.x);

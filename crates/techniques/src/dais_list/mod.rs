@@ -343,11 +343,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn references_tell_the_triangles_of_262144_draws_apart() {
-        for (samples, draws) in [(8, 262_144), (16, 131_072)] {
+    fn references_tell_the_triangles_of_262143_draws_apart() {
+        for (samples, draws) in [(8, 262_143), (16, 131_071)] {
             assert!(check_draws(draws, references_max(samples)).is_ok());
             let error = check_draws(draws + 1, references_max(samples)).expect_err("one more").to_string();
-            assert!(error.contains("dais-list") && error.contains(&(1024 * draws).to_string()), "{error}");
+            assert!(error.contains("dais-list") && error.contains(&(1024 * (draws + 1) - 1).to_string()), "{error}");
         }
     }
 }
