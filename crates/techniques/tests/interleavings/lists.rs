@@ -118,6 +118,7 @@ fn light_lists_hold_every_light_once() {
         "\
     if (node < NODE_CAPACITY) {
         light_nodes[node] = uvec2(light_index, atomicExchange(light_heads[pixel].link, node + 1u));
+        return;
     }",
     );
     for capacity in [0, 1, 3] {

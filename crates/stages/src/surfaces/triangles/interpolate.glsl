@@ -25,7 +25,28 @@ vec3 divided(vec3 over_w, vec3 inverse_w, float w) {
     return vec3(a, (over_w.yz - a * inverse_w.yz) * w);
 }
 
-TextureCoordinates interpolated_uv(uint word, vec2 from_anchor_px, vec3 inverse_w, float w) {
+// 1/w changes by this fraction within a pixel where the triangle's plane nearly ends in it, at its horizon.
+const float STEEP_CHANGE = 0.125;
+
+// Texture coordinates at another pixel of the record's plane.
+vec2 uv_at(uint word, vec2 from_anchor_px, vec3 inverse_w, vec2 step_px) {
+    vec2 over_w = vec2(record_affine(word, from_anchor_px + step_px).x, record_affine(word + 3u, from_anchor_px + step_px).x);
+    return over_w / (inverse_w.x + dot(inverse_w.yz, step_px));
+}
+
+// The same with changes as a quad of fragments has them: differences between its upper left pixel and the pixels beside and below it.
+// `to_corner_px` leads from the pixel to that corner.
+TextureCoordinates quad_uv(uint word, vec2 from_anchor_px, vec3 inverse_w, vec2 to_corner_px) {
+    vec2 corner = uv_at(word, from_anchor_px, inverse_w, to_corner_px);
+    return TextureCoordinates(uv_at(word, from_anchor_px, inverse_w, vec2(0.0)),
+                              uv_at(word, from_anchor_px, inverse_w, to_corner_px + vec2(1.0, 0.0)) - corner,
+                              uv_at(word, from_anchor_px, inverse_w, to_corner_px + vec2(0.0, 1.0)) - corner);
+}
+
+TextureCoordinates interpolated_uv(uint word, vec2 from_anchor_px, vec3 inverse_w, float w, vec2 to_corner_px) {
+    if (max(abs(inverse_w.y), abs(inverse_w.z)) > STEEP_CHANGE * abs(inverse_w.x)) {
+        return quad_uv(word, from_anchor_px, inverse_w, to_corner_px);
+    }
     vec3 u = divided(record_affine(word, from_anchor_px), inverse_w, w);
     vec3 v = divided(record_affine(word + 3u, from_anchor_px), inverse_w, w);
     return TextureCoordinates(vec2(u.x, v.x), vec2(u.y, v.y), vec2(u.z, v.z));
@@ -136,8 +157,9 @@ SurfacePoint interpolated_point(uint index, vec2 pixel, out uint material) {
     SurfacePoint p;
     p.position_ws = interpolated_position(first_words, center);
     p.front_facing = (triangle_buffer[record + 18u] & RECORD_FRONT) != 0u;
-    p.uv0 = interpolated_uv(record + 12u, from_anchor, inverse_w, w);
-    p.uv1 = HAS_UV1 != 0u ? interpolated_uv(record + UV1_WORD, from_anchor, inverse_w, w) : p.uv0;
+    vec2 to_corner = 2.0 * floor(0.5 * pixel) - pixel;
+    p.uv0 = interpolated_uv(record + 12u, from_anchor, inverse_w, w, to_corner);
+    p.uv1 = HAS_UV1 != 0u ? interpolated_uv(record + UV1_WORD, from_anchor, inverse_w, w, to_corner) : p.uv0;
     p.color = vec4(1.0);
     if (HAS_VERTEX_COLOR != 0u) {
         for (uint i = 0u; i < 4u; ++i) {
