@@ -21,6 +21,9 @@ const POSITION_ROUNDING: f64 = 8.0 * f32::EPSILON as f64;
 /// Rounding widens the rays to more than this where the eye nearly touches a surface, pixels: such pixels are not judged.
 const WIDEST_PX: f64 = 1.5;
 
+/// Places where a device may sample a pixel, in steps of [`SNAP_PX`] from its centre, which is the first.
+const OFFSETS: [[i32; 2]; 9] = [[0, 0], [-1, -1], [0, -1], [1, -1], [-1, 0], [1, 0], [-1, 1], [0, 1], [1, 1]];
+
 /// Depth as a device interpolates it may be off by this, of a range of 1: 16 units in the last place of depths below 1, since the plane of a large
 /// triangle is a difference of terms of that size.
 pub const DEPTH_ROUNDING: f64 = 8.0 * f32::EPSILON as f64;
@@ -113,9 +116,7 @@ impl<'a> Judge<'a> {
     /// What rays around a pixel's centre show, and the nearest view distance among them, metres.
     fn around(&self, pixel: [u32; 2], offset_px: f64) -> (Sight, f64) {
         let center = DVec2::new(f64::from(pixel[0]), f64::from(pixel[1])) + 0.5;
-        // The centre first.
-        let offsets = [[0, 0], [-1, -1], [0, -1], [1, -1], [-1, 0], [1, 0], [-1, 1], [0, 1], [1, 1]];
-        let rays = offsets.map(|[x, y]| {
+        let rays = OFFSETS.map(|[x, y]| {
             let place = center + offset_px * DVec2::new(f64::from(x), f64::from(y));
             self.loosened(ray_through(self.camera, place, self.size_px))
         });
@@ -176,17 +177,19 @@ impl<'a> Judge<'a> {
             || hit.distance_m > far_m - self.near_doubt_m(far_m)
     }
 
-    /// Least and greatest view distance of a hit's plane at some rays; without an end where the plane is edge-on.
+    /// Least and greatest view distance of a hit's plane at some rays; without an end where the plane is edge-on. A plane ends at its horizon
+    /// in a view with perspective alone: in one without, it goes on behind the eye.
     fn plane_range_m(&self, hit: &Hit, rays: &[Ray]) -> [f64; 2] {
         let normal_ws = self.rays.plane_normal_ws(hit);
         let point_ws = self.rays.attributes(hit).position_ws;
+        let has_horizon = matches!(self.camera.projection, Projection::Perspective { .. });
         let mut range_m = [hit.distance_m; 2];
         for ray in rays {
             let along = normal_ws.dot(ray.direction_ws);
             let distance_m = normal_ws.dot(point_ws - ray.origin_ws) / along;
-            // Beyond the horizon of the plane, or in it.
-            if !(distance_m > 0.0 && distance_m.is_finite()) {
-                return [range_m[0], f64::INFINITY];
+            if !distance_m.is_finite() || (has_horizon && distance_m <= 0.0) {
+                range_m[1] = f64::INFINITY;
+                continue;
             }
             range_m = [range_m[0].min(distance_m), range_m[1].max(distance_m)];
         }
@@ -210,7 +213,8 @@ impl<'a> Judge<'a> {
         let center = DVec2::new(f64::from(pixel[0]), f64::from(pixel[1])) + 0.5;
         let ambient = self.rays.scene().environment.ambient_radiance.as_dvec3();
         let mut range: Option<[DVec3; 2]> = None;
-        for offset in [DVec2::ZERO, DVec2::X, DVec2::NEG_X, DVec2::Y, DVec2::NEG_Y] {
+        for [x, y] in OFFSETS {
+            let offset = DVec2::new(f64::from(x), f64::from(y));
             let ray = ray_through(self.camera, center + SNAP_PX * offset, self.size_px);
             if !self.rays.layers(&ray, hit.distance_m * (1.0 + 1e-3)).is_empty() {
                 return None;
@@ -236,7 +240,7 @@ impl Sight {
     pub fn accepts(&self, seen: Seen) -> bool {
         let Seen::Surface([near_m, far_m]) = seen else { return self.may_be_nothing };
         // Interpolation of a plane rounds by about 10 units in the last place of a distance.
-        let slack_m = |distance_m: f64| self.rounding_m + 1e-6 * distance_m;
+        let slack_m = |distance_m: f64| self.rounding_m + 1e-6 * distance_m.abs();
         self.candidates.iter().any(|one| {
             let [least_m, most_m] = one.range_m;
             near_m <= most_m + slack_m(most_m) && far_m >= least_m - slack_m(least_m)
