@@ -17,8 +17,8 @@ use afterlight_graph::{BufferHandle, BufferRole, Graph, ImageHandle, Load, PassR
 
 use afterlight_cost::{Cost, Workload};
 use afterlight_frame::{
-    ANY_SAMPLES, Answers, AppendixA, Approximation, Condition, Exactness, Frame, Info, OpaqueDepth, Params, Source, SourceSlots,
-    Technique, TechniqueError, TriangleIds, views,
+    ANY_SAMPLES, Answers, AppendixA, Approximation, Condition, Exactness, Frame, Info, OpaqueDepth, Params,
+    Source, SourceSlots, Technique, TechniqueError, TriangleIds, views,
 };
 use afterlight_shader::Shader;
 use afterlight_stages::{
@@ -283,11 +283,8 @@ fn record_cached(
     let references = name(if wide { "wide references" } else { "references" });
     let references =
         graph.image(&references, BufferRole::Visibility, frame.multisampled_info(vk::Format::R8G8B8A8_UNORM));
-    let depth = graph.image(
-        &name("depth"),
-        BufferRole::Depth,
-        frame.multisampled_info(frame.depth_stencil_format()),
-    );
+    let depth =
+        graph.image(&name("depth"), BufferRole::Depth, frame.multisampled_info(frame.depth_stencil_format()));
     let list = triangles::List::new(graph, frame, technique, records, REFERENCES_MAX)?;
     let cache = Cache::new(graph, technique, params.cache, &list);
     let tags = if wide { &["wide"][..] } else { &[] };

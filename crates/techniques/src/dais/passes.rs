@@ -3,9 +3,7 @@
 use afterlight_graph::{BufferHandle, BufferRole, DepthTest, Graph, PassRole, RasterPass};
 
 use afterlight_frame::{DrawCommands, Frame, TechniqueError};
-use afterlight_stages::surfaces::{
-    claims::NOT_TAKEN, depth_first::FIRST_FRAGMENT, geometry::SceneDraws,
-};
+use afterlight_stages::surfaces::{claims::NOT_TAKEN, depth_first::FIRST_FRAGMENT, geometry::SceneDraws};
 
 /// What the first pass draws: depth alone. In tessellated frames both passes have a geometry shader, so that their depths are
 /// equal.

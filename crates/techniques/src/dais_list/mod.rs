@@ -12,8 +12,8 @@ use afterlight_graph::{BufferHandle, BufferRole, Graph, ImageHandle, ImageInfo, 
 use crate::dais::{self, Asked, Cache, CacheParams, FillPass, LowRate};
 use afterlight_cost::{Cost, Workload};
 use afterlight_frame::{
-    Answers, DrawCommands, Exactness, Frame, Info, MULTIPLE_SAMPLES, Need, Params, Source, SourceSlots, Technique,
-    TechniqueError, capacity::FIRST_GUESS, params::AutoOr, scene::DRAW_TRIANGLES, views,
+    Answers, DrawCommands, Exactness, Frame, Info, MULTIPLE_SAMPLES, Need, Params, Source, SourceSlots,
+    Technique, TechniqueError, capacity::FIRST_GUESS, params::AutoOr, scene::DRAW_TRIANGLES, views,
 };
 use afterlight_shader::Shader;
 use afterlight_stages::{
@@ -347,7 +347,10 @@ mod tests {
         for (samples, draws) in [(8, 262_143), (16, 131_071)] {
             assert!(check_draws(draws, references_max(samples)).is_ok());
             let error = check_draws(draws + 1, references_max(samples)).expect_err("one more").to_string();
-            assert!(error.contains("dais-list") && error.contains(&(1024 * (draws + 1) - 1).to_string()), "{error}");
+            assert!(
+                error.contains("dais-list") && error.contains(&(1024 * (draws + 1) - 1).to_string()),
+                "{error}"
+            );
         }
     }
 }

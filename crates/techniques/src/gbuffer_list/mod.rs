@@ -13,8 +13,8 @@ use afterlight_graph::{BufferHandle, BufferRole, DepthTest, Graph, ImageHandle, 
 
 use afterlight_cost::{Cost, Workload};
 use afterlight_frame::{
-    ANY_SAMPLES, Answers, AppendixA, Approximation, Condition, Exactness, Frame, Info, OpaqueDepth, Params, Source, Technique,
-    TechniqueError, params::Words, set_constants,
+    ANY_SAMPLES, Answers, AppendixA, Approximation, Condition, Exactness, Frame, Info, OpaqueDepth, Params,
+    Source, Technique, TechniqueError, params::Words, set_constants,
 };
 use afterlight_shader::Shader;
 use afterlight_stages::{

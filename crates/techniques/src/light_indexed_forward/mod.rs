@@ -45,7 +45,9 @@ static INFO: Info = Info {
         rates_decoupled: "n, n",
     },
     exactness: indices::EXACTNESS,
-    departures: &["one sample a pixel alone, where the hardware could average several: a pixel has one list of lights"],
+    departures: &[
+        "one sample a pixel alone, where the hardware could average several: a pixel has one list of lights",
+    ],
     ..Info::USUAL
 };
 
