@@ -555,12 +555,37 @@ fn errors(view: &View, triangles: &[Triangle], tangents: Tangents, found: &[f32]
             let exact = oracle.changes(a);
             let magnitude = exact[0].value.hypot(exact[1].value);
             shift.add(error, magnitude, slack);
+            let Some(exact) = expected_changes(view, t, &oracle, a) else { continue };
+            let magnitude = exact[0].value.hypot(exact[1].value);
             for (k, exact) in exact.into_iter().enumerate() {
                 changes.add((found[8 + 2 * k + axis] - exact.value).abs(), magnitude, exact.slack);
             }
         }
     }
     errors
+}
+
+/// `STEEP_CHANGE` of `interpolate.glsl`.
+const STEEP_CHANGE: f64 = 0.125;
+
+/// Changes of an attribute a pixel: analytic ones; where 1/w changes by more than [`STEEP_CHANGE`] within the pixel, differences within its quad.
+/// None where rounding decides between the two, and where a pixel of the quad is so near the plane's horizon that first-order slack says
+/// nothing.
+fn expected_changes(view: &View, t: &Triangle, oracle: &Oracle, a: [f64; 3]) -> Option<[Exact; 2]> {
+    if oracle.sum_change < STEEP_CHANGE * 0.97 {
+        return Some(oracle.changes(a));
+    }
+    if oracle.sum_change < STEEP_CHANGE * 1.03 {
+        return None;
+    }
+    let corner = t.pixel.map(|place| place & !1);
+    let value = |x, y| {
+        let of_quad = Oracle::new(view, &Triangle { pixel: [corner[0] + x, corner[1] + y], ..*t })?;
+        (of_quad.sum_change < 0.25).then(|| of_quad.value(a, 0.0))
+    };
+    let first = value(0, 0)?;
+    let from_first = |of: Exact| Exact { value: of.value - first.value, slack: of.slack + first.slack };
+    Some([from_first(value(1, 0)?), from_first(value(0, 1)?)])
 }
 
 fn range(a: [f64; 3]) -> f64 {
