@@ -43,13 +43,18 @@ TextureCoordinates quad_uv(uint word, vec2 from_anchor_px, vec3 inverse_w, vec2 
                               uv_at(word, from_anchor_px, inverse_w, to_corner_px + vec2(0.0, 1.0)) - corner);
 }
 
+// The same with changes at the pixel's centre.
+TextureCoordinates analytic_uv(uint word, vec2 from_anchor_px, vec3 inverse_w, float w) {
+    vec3 u = divided(record_affine(word, from_anchor_px), inverse_w, w);
+    vec3 v = divided(record_affine(word + 3u, from_anchor_px), inverse_w, w);
+    return TextureCoordinates(vec2(u.x, v.x), vec2(u.y, v.y), vec2(u.z, v.z));
+}
+
 TextureCoordinates interpolated_uv(uint word, vec2 from_anchor_px, vec3 inverse_w, float w, vec2 to_corner_px) {
     if (max(abs(inverse_w.y), abs(inverse_w.z)) > STEEP_CHANGE * abs(inverse_w.x)) {
         return quad_uv(word, from_anchor_px, inverse_w, to_corner_px);
     }
-    vec3 u = divided(record_affine(word, from_anchor_px), inverse_w, w);
-    vec3 v = divided(record_affine(word + 3u, from_anchor_px), inverse_w, w);
-    return TextureCoordinates(vec2(u.x, v.x), vec2(u.y, v.y), vec2(u.z, v.z));
+    return analytic_uv(word, from_anchor_px, inverse_w, w);
 }
 
 // World position at a pixel from the first three words.
@@ -110,10 +115,9 @@ void find_frame(uint record, vec2 from_anchor_px, vec2 pixel_center, float w, ui
         vec3 dp_dx = interpolated_position(first_words, pixel_center + vec2(1.0, 0.0)) - p.position_ws + ray * first_words.y;
         vec3 dp_dy = interpolated_position(first_words, pixel_center + vec2(0.0, 1.0)) - p.position_ws + ray * first_words.z;
         bool second_set = HAS_UV1 != 0u && (load_material(material).normal_slot & (1u << 24)) != 0u;
-        TextureCoordinates at = p.uv0;
-        if (second_set) {
-            at = p.uv1;
-        }
+        vec3 inverse_w = orthographic ? vec3(1.0, 0.0, 0.0) : first_words;
+        uint word = second_set ? record + UV1_WORD : record + 12u;
+        TextureCoordinates at = analytic_uv(word, from_anchor_px, inverse_w, w);
         p.tangent_ws = tangent_from_changes(p.normal_ws, dp_dx, dp_dy, at);
     }
 }
