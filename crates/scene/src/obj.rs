@@ -6,7 +6,7 @@ use std::{
     path::Path,
 };
 
-use glam::{Affine3A, DAffine3, Vec2, Vec3, Vec4};
+use glam::{Affine3A, DAffine3, DVec3, Vec2, Vec3, Vec4};
 
 use crate::{
     Aabb, AlphaMode, Image, ImageData, Instance, Material, Mesh, Node, Sampler, Scene, SceneError,
@@ -28,17 +28,16 @@ fn load_with(
     read_library: &dyn Fn(&Path) -> Result<Vec<u8>, SceneError>,
 ) -> Result<Scene, SceneError> {
     check_indices(file, bytes)?;
-    let (bytes, origin_file) = origin::obj_near_its_origin(bytes);
-    let mut scene = Scene { origin_file, ..Scene::default() };
     let options =
         tobj::LoadOptions { single_index: true, triangulate: true, ignore_points: true, ignore_lines: true };
     let libraries = RefCell::new(Libraries { file, read: read_library, materials: vec![], warnings: vec![] });
-    let parsed = tobj::load_obj_buf(&mut BufReader::new(Cursor::new(&bytes[..])), &options, |name| {
+    let parsed = tobj::load_obj_buf(&mut BufReader::new(Cursor::new(bytes)), &options, |name| {
         libraries.borrow_mut().add(name)
     });
     let (models, _) = parsed.map_err(|e| SceneError::invalid(file, "OBJ", e.to_string(), "Wavefront OBJ"))?;
     let libraries = libraries.into_inner();
-    scene.warnings = libraries.warnings;
+    let mut scene =
+        Scene { origin_file: origin_of(&models), warnings: libraries.warnings, ..Scene::default() };
     let mut images = Images { file, images: Vec::new() };
     for m in &libraries.materials {
         scene.materials.push(convert_material(&mut images, m, &mut scene.warnings)?);
@@ -61,6 +60,15 @@ fn load_with(
         add_mesh(file, model, material, &mut scene)?;
     }
     Ok(scene)
+}
+
+/// The origin for what a file's shapes show, in the file's coordinates.
+fn origin_of(models: &[tobj::Model]) -> DVec3 {
+    let positions = models.iter().flat_map(|model| model.mesh.positions.as_chunks::<3>().0);
+    let (min, max) = positions
+        .map(|position| DVec3::from_array(*position))
+        .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(min, max), p| (min.min(p), max.max(p)));
+    origin::origin_of(min, max)
 }
 
 /// The material libraries that a file names.
@@ -106,6 +114,10 @@ fn check_indices(file: &Path, bytes: &[u8]) -> Result<(), SceneError> {
             Some("vn") => counts[2] += 1,
             Some("f" | "l") => {
                 for (index, count) in words.flat_map(|word| word.split('/').zip(counts)) {
+                    // What is short and has no sign reaches nowhere that `tobj` could not.
+                    if index.len() < 10 && !index.starts_with('-') {
+                        continue;
+                    }
                     let Ok(value) = index.parse::<i64>() else { continue };
                     if value < -count || value > i64::from(u32::MAX) {
                         return Err(SceneError::invalid(
@@ -231,21 +243,25 @@ fn add_mesh(file: &Path, model: &tobj::Model, material: u32, scene: &mut Scene) 
     if indices.is_empty() {
         return Ok(());
     }
-    let mut positions_os: Vec<[f32; 3]> = mesh.positions.as_chunks::<3>().0.to_vec();
+    let origin = scene.origin_file;
+    let relative = |p: &[f64; 3]| (DVec3::from_array(*p) - origin).as_vec3().to_array();
+    let mut positions_os: Vec<[f32; 3]> = mesh.positions.as_chunks::<3>().0.iter().map(relative).collect();
     if let Some(&worst) = indices.iter().max().filter(|m| **m as usize >= positions_os.len()) {
         return Err(invalid(format!("the index {worst}"), &format!("an index below {}", positions_os.len())));
     }
-    let numbers = [&mesh.positions, &mesh.normals, &mesh.texcoords, &mesh.vertex_color];
-    if let Some(bad) = numbers.into_iter().flatten().find(|v| !v.is_finite()) {
+    let numbers = [&mesh.normals, &mesh.texcoords, &mesh.vertex_color].into_iter().flatten();
+    let numbers = numbers.map(|number| *number as f32).chain(positions_os.as_flattened().iter().copied());
+    if let Some(bad) = numbers.into_iter().find(|number| !number.is_finite()) {
         return Err(invalid(bad.to_string(), "finite numbers"));
     }
     // OBJ has v upwards, the scene model downwards
     let mut uvs: Vec<[f32; 2]> =
-        mesh.texcoords.as_chunks::<2>().0.iter().map(|&[u, v]| [u, 1.0 - v]).collect();
+        mesh.texcoords.as_chunks::<2>().0.iter().map(|&[u, v]| [u as f32, 1.0 - v as f32]).collect();
     uvs.resize(positions_os.len(), [0.0; 2]);
-    let mut colors: Vec<[f32; 3]> = mesh.vertex_color.as_chunks::<3>().0.to_vec();
+    let three = |v: &[f64; 3]| v.map(|number| number as f32);
+    let mut colors: Vec<[f32; 3]> = mesh.vertex_color.as_chunks::<3>().0.iter().map(three).collect();
     colors.resize(positions_os.len(), [1.0; 3]);
-    let mut normals_os: Vec<[f32; 3]> = mesh.normals.as_chunks::<3>().0.to_vec();
+    let mut normals_os: Vec<[f32; 3]> = mesh.normals.as_chunks::<3>().0.iter().map(three).collect();
     if normals_os.len() != positions_os.len() {
         (positions_os, uvs, colors) =
             (pick(&positions_os, &indices), pick(&uvs, &indices), pick(&colors, &indices));
@@ -328,6 +344,20 @@ mod tests {
     }
 
     const TRIANGLE: &str = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\nusemtl m\nf 1 2 3\n";
+
+    /// Coordinates are divided by their fourth number, wherever the shape stands.
+    #[test]
+    fn positions_far_away_are_divided_by_their_weight() {
+        let of = |vertices: &str| {
+            let scene = load_texts(format!("{vertices}f 1 2 3\n").as_bytes(), b"").expect("a triangle");
+            let place = |p: &[f32; 3]| scene.file_from_world((*p).into());
+            scene.positions_os.iter().map(place).collect::<Vec<_>>()
+        };
+        let plain = of("v 1400000 1 2\nv 1400001 1 2\nv 1400000 2 2.5\n");
+        let weighted = of("v 2800000 2 4 2\nv 1400001 1 2 1\nv 5600000 8 10 4\n");
+        assert_eq!(plain, weighted);
+        assert_eq!(plain[1] - plain[0], glam::DVec3::X);
+    }
 
     #[test]
     fn a_library_with_rare_statements_keeps_its_materials() {

@@ -4,7 +4,7 @@
 //! origin of its own beside it, [`Scene::origin_file`], and everything in memory and on the device is relative to that. The
 //! difference is taken in 64 bits, before anything is rounded. A scene near the file's origin keeps it.
 
-use std::{borrow::Cow, collections::HashMap};
+use std::collections::HashMap;
 
 use glam::{DAffine3, DVec3};
 
@@ -28,7 +28,9 @@ pub(crate) fn origin_of(min: DVec3, max: DVec3) -> DVec3 {
         return DVec3::ZERO;
     }
     // A multiple of a power of two no greater than the extent: no more of the extent is lost than the half of it.
-    let step_m = if size_m > 0.0 { size_m.log2().floor().exp2() } else { 1.0 };
+    // What 64 bits do not resolve at that distance is no extent.
+    let size_m = size_m.max(distance_m * f64::EPSILON);
+    let step_m = size_m.log2().floor().exp2();
     (center / step_m).round() * step_m
 }
 
@@ -123,50 +125,6 @@ impl Scene {
     }
 }
 
-/// The text of an OBJ file with its vertices relative to an origin beside them, and that origin; the text itself where the
-/// vertices are near. The reader of OBJ files rounds coordinates to 32 bits.
-pub(crate) fn obj_near_its_origin(text: &[u8]) -> (Cow<'_, [u8]>, DVec3) {
-    // What is far has no vertex nearer than this: the first one tells, and most files are not looked through.
-    let first = text.split(|b| *b == b'\n').find_map(vertex);
-    if first.is_none_or(|(p, _)| p == DVec3::ZERO) {
-        return (Cow::Borrowed(text), DVec3::ZERO);
-    }
-    let all = text.split(|b| *b == b'\n').filter_map(vertex);
-    let (min, max) = all.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(a, b), (p, _)| (a.min(p), b.max(p)));
-    let origin = origin_of(min, max);
-    if origin == DVec3::ZERO {
-        return (Cow::Borrowed(text), origin);
-    }
-    let mut moved = Vec::with_capacity(text.len());
-    for line in text.split_inclusive(|b| *b == b'\n') {
-        match vertex(line) {
-            Some((p, rest)) => {
-                let [x, y, z] = (p - origin).to_array();
-                moved.extend_from_slice(format!("v {x} {y} {z} ").as_bytes());
-                moved.extend_from_slice(rest);
-            }
-            None => moved.extend_from_slice(line),
-        }
-    }
-    (Cow::Owned(moved), origin)
-}
-
-/// The position that a line of an OBJ file gives, and what follows it; `None` for other lines.
-fn vertex(line: &[u8]) -> Option<(DVec3, &[u8])> {
-    let mut rest = line.trim_ascii_start().strip_prefix(b"v")?;
-    let mut p = [0.0; 3];
-    for number in &mut p {
-        let start = rest.trim_ascii_start();
-        if start.len() == rest.len() {
-            return None;
-        }
-        let end = start.iter().position(u8::is_ascii_whitespace).unwrap_or(start.len());
-        *number = std::str::from_utf8(&start[..end]).ok()?.parse().ok().filter(|v: &f64| v.is_finite())?;
-        rest = &start[end..];
-    }
-    Some((DVec3::from_array(p), rest))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -180,30 +138,14 @@ mod tests {
             assert_eq!(of(center, size), DVec3::ZERO, "{center} {size}");
         }
         assert_eq!(origin_of(DVec3::INFINITY, DVec3::NEG_INFINITY), DVec3::ZERO, "empty");
-        for (center, size) in [(14_000.3, 20.0), (-1.4e6, 3.0), (1.4e6, 1.0e5), (5.0, 0.01), (7.0, 0.0)] {
+        for (center, size) in
+            [(14_000.3, 20.0), (-1.4e6, 3.0), (1.4e6, 1.0e5), (5.0, 0.01), (7.0, 0.0), (1e10, 1e-300)]
+        {
             let origin = of(center, size);
             assert!(
                 (origin - center).abs().max_element() <= (0.5 * size).max(0.5),
                 "{center} {size}: {origin}"
             );
         }
-    }
-
-    #[test]
-    fn vertices_of_text_are_moved_and_nothing_else() {
-        let far =
-            b"# v 1 2 3\nvn 0 1 0\n v 1400000.3 2 -7.25 0.5 0.5 1\nv\t1400001.3 3 -6.25\r\nf 1 2 3\nv x\n";
-        let (moved, origin) = obj_near_its_origin(far);
-        assert!((origin.x - 1.4e6).abs() <= 2.0 && origin.y.abs() < 4.0);
-        let lines: Vec<&[u8]> = moved.split(|b| *b == b'\n').collect();
-        assert_eq!(
-            [lines[0], lines[1], lines[4], lines[5]],
-            [&b"# v 1 2 3"[..], b"vn 0 1 0", b"f 1 2 3", b"v x"]
-        );
-        let (p, rest) = vertex(lines[2]).expect("a vertex");
-        assert!((p + origin).abs_diff_eq(DVec3::new(1_400_000.3, 2.0, -7.25), 1e-9));
-        assert_eq!(rest.trim_ascii(), b"0.5 0.5 1");
-        let near = b"v 0 0 1\nv 1400000.3 2 -7.25\n";
-        assert!(matches!(obj_near_its_origin(near), (Cow::Borrowed(_), DVec3::ZERO)));
     }
 }
