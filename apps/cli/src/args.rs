@@ -84,7 +84,7 @@ pub struct SceneArgs {
     #[arg(default_value = DEFAULT_SCENE)]
     pub scene: String,
     /// Time at which animated nodes are posed, seconds
-    #[arg(long, value_name = "SECONDS", value_parser = finite)]
+    #[arg(long, value_name = "SECONDS", value_parser = finite, allow_negative_numbers = true)]
     pub time: Option<f64>,
     #[command(flatten)]
     pub json: JsonArgs,
@@ -152,7 +152,7 @@ pub struct VerifyArgs {
     #[arg(long, value_name = "K", default_value_t = 0, value_parser = clap::value_parser!(u64).range(0..=1_000_000_000_000))]
     pub first: u64,
     /// Begin no further view after this time, seconds
-    #[arg(long, value_name = "SECONDS", value_parser = finite)]
+    #[arg(long, value_name = "SECONDS", value_parser = above_zero)]
     pub seconds: Option<f64>,
     /// Techniques, by their ids, or all
     #[arg(long, value_name = "ID,ID…|all", value_delimiter = ',', default_value = "all")]
@@ -185,7 +185,7 @@ pub struct VerifyArgs {
     #[arg(long, value_name = "NAME|INDEX")]
     pub device: Option<String>,
     /// Time at which animated nodes are posed, seconds
-    #[arg(long, value_name = "SECONDS", value_parser = finite)]
+    #[arg(long, value_name = "SECONDS", value_parser = finite, allow_negative_numbers = true)]
     pub time: Option<f64>,
     /// Turn on Vulkan validation; any message makes the exit code 3
     #[arg(long)]
@@ -334,7 +334,7 @@ pub struct CommonArgs {
     #[arg(long, value_name = "NAME|INDEX")]
     pub device: Option<String>,
     /// Time at which animated nodes are posed, seconds
-    #[arg(long, value_name = "SECONDS", value_parser = finite)]
+    #[arg(long, value_name = "SECONDS", value_parser = finite, allow_negative_numbers = true)]
     pub time: Option<f64>,
     #[command(flatten)]
     pub effects: EffectArgs,
@@ -393,10 +393,26 @@ fn finite(text: &str) -> Result<f64, String> {
     }
 }
 
+fn above_zero(text: &str) -> Result<f64, String> {
+    finite(text).and_then(|seconds| match seconds > 0.0 {
+        true => Ok(seconds),
+        false => Err("expected a number of seconds above 0".to_owned()),
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::CommandFactory as _;
+    use clap::{CommandFactory as _, Parser as _};
+
+    /// Commands that `verify` prints are read back, whatever its own time was.
+    #[test]
+    fn times_before_the_first_are_taken_as_they_are_printed() {
+        for command in ["compare", "verify"] {
+            assert!(Cli::try_parse_from(["afterlight", command, "--time", "-1.5"]).is_ok(), "{command}");
+        }
+        assert!(Cli::try_parse_from(["afterlight", "verify", "--seconds", "0"]).is_err());
+    }
 
     #[test]
     fn command_line_is_consistent() {

@@ -2,7 +2,11 @@ use nv_flip::{FlipImageRgb8, FlipPool};
 
 use crate::{ImageError, Rgba8Image};
 
-fn check_sizes(what: &'static str, reference: &Rgba8Image, test: &Rgba8Image) -> Result<(), ImageError> {
+pub(crate) fn check_sizes(
+    what: &'static str,
+    reference: &Rgba8Image,
+    test: &Rgba8Image,
+) -> Result<(), ImageError> {
     for image in [reference, test] {
         crate::check_length(image.width, image.height, image.pixels.len())?;
     }

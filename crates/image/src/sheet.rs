@@ -1,4 +1,7 @@
-use crate::{Flip, ImageError, Rgba8Image, compare::is_off};
+use crate::{
+    Flip, ImageError, Rgba8Image,
+    compare::{check_sizes, is_off},
+};
 
 /// A difference image: each channel's absolute difference times `amplification`, clamped; opaque.
 ///
@@ -27,10 +30,7 @@ pub fn difference_sheet(
 /// # Errors
 /// [`ImageError::SizeMismatch`].
 pub fn marked_sheet(reference: &Rgba8Image, test: &Rgba8Image, least: u8) -> Result<Rgba8Image, ImageError> {
-    let (found, expected) = ((test.width, test.height), (reference.width, reference.height));
-    if found != expected {
-        return Err(ImageError::SizeMismatch { what: "marked sheet", found, expected });
-    }
+    check_sizes("marked sheet", reference, test)?;
     let row_bytes = reference.width as usize * 4;
     let marked = |(a, b): (&[u8], &[u8])| {
         // Rec. 709 luma, of 256, at a third.

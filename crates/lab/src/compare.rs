@@ -105,13 +105,16 @@ fn judge(result: &mut RunResult, chosen: &Chosen, psnr_db: f64, spec: &FrameSpec
         return;
     }
     let least_db = least_psnr_db(chosen, spec.samples, spec.effects.post.filter);
-    if psnr_db < least_db {
+    if let Some(reason) = shortfall(reference.id(), psnr_db, least_db) {
         result.status = Status::Failed;
-        result.reason = Some(format!(
-            "PSNR to {}: found {psnr_db:.1} dB, expected at least {least_db:.1} dB",
-            reference.id()
-        ));
+        result.reason = Some(reason);
     }
+}
+
+/// How an image falls short of the least PSNR to a reference, in words; none where it does not.
+pub(crate) fn shortfall(reference: &str, psnr_db: f64, least_db: f64) -> Option<String> {
+    (psnr_db < least_db)
+        .then(|| format!("PSNR to {reference}: found {psnr_db:.1} dB, expected at least {least_db:.1} dB"))
 }
 
 /// Least PSNR to `forward` that a technique must have with its parameters, dB.

@@ -6,13 +6,17 @@ use afterlight_techniques::{Effects, ParamSet as _};
 use serde::{Deserialize as _, Deserializer, Serializer, de::Error as _};
 use serde_json::Value;
 
-/// For `#[serde(with)]`.
-pub fn serialize<S: Serializer>(effects: &Effects, serializer: S) -> Result<S::Ok, S::Error> {
+/// Parameters of effects that are not as they are by default, by their keys. One key may stand for parameters of several effects.
+pub(crate) fn changed(effects: &Effects) -> BTreeMap<&'static str, String> {
     let usual = effects.infos().into_iter();
     let changed =
         effects.described().into_iter().zip(usual).filter(|(now, usual)| now.default != usual.default);
-    let words: BTreeMap<&str, Value> = changed.map(|(now, _)| (now.key, value(&now.default))).collect();
-    serializer.collect_map(words)
+    changed.map(|(now, _)| (now.key, now.default)).collect()
+}
+
+/// For `#[serde(with)]`.
+pub fn serialize<S: Serializer>(effects: &Effects, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(changed(effects).into_iter().map(|(key, text)| (key, value(&text))))
 }
 
 /// For `#[serde(with)]`.

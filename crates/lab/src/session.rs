@@ -63,7 +63,7 @@ pub fn open_device(spec: &FrameSpec) -> Result<Device, LabError> {
         select: spec.device.clone(),
         validate: spec.validate,
         pipeline_cache_dir: cache_folder(),
-        without_float_stencil: false,
+        ..DeviceOptions::default()
     })?;
     check_samples(&device, spec.samples)?;
     Ok(device)

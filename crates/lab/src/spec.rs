@@ -31,8 +31,7 @@ pub struct FrameSpec {
     pub lights: u32,
     /// Seed of the lights.
     pub light_seed: u64,
-    /// Camera of the scene by name or index, or `x,y,z,tx,ty,tz,fov_deg`: eye and target in metres, vertical angle of view in
-    /// degrees. None for the scene's first.
+    /// Camera in the words of [`camera::select`](afterlight_scene::camera::select); none for the scene's first.
     pub camera: Option<String>,
     /// Parameters of techniques, `KEY=VALUE` or `ID.KEY=VALUE`.
     pub set: Vec<String>,

@@ -238,10 +238,7 @@ impl Trial {
                 result.counters.insert(format!("{}_{what}", counter.name), Value::from(count));
             }
         }
-        result.reason = counters.iter().find(|counter| counter.dropped > 0).map(|counter| {
-            let Counter { name, needed, capacity, dropped, .. } = counter;
-            format!("{name}: found {needed} needed, {capacity} there; {dropped} samples dropped")
-        });
+        result.reason = counters.iter().find_map(Counter::dropped_text);
         if let Some(pairs) = prepared.light_pairs()? {
             result.counters.insert("light_pairs_tested".to_owned(), pairs.tested.into());
             result.counters.insert("light_pairs_lit".to_owned(), pairs.lit.into());

@@ -52,12 +52,24 @@ fn all_hold(source: &str, seed: u64) {
     assert_eq!((found.views, found.off_count), (VIEWS, 0));
     assert!(found.comparisons > VIEWS * 15, "{} comparisons", found.comparisons);
     assert!(found.probes.surfaces > VIEWS * 64, "{:?}", found.probes);
-    // Rasterisation in compute is verified beside the raster pass wherever the device has it.
-    let compared = |label: &str| found.techniques.iter().any(|one| one.technique == label);
-    let told = |label: &str| found.left_out.iter().any(|one| one.technique == label);
-    for way in ["visibility raster", "visibility compute"] {
-        let renders_one_sample = found.techniques.iter().any(|one| one.technique == "deferred");
-        assert!(compared(way) || told(way) || !renders_one_sample, "{way} is not compared");
+}
+
+/// Rasterisation in compute is verified beside the raster pass, wherever the device has it.
+#[test]
+fn both_ways_of_visibility_are_compared() {
+    let visibility = choose("techniques", &["visibility".to_owned()], &[]).expect("visibility");
+    let mut spec = small(1, 3);
+    spec.fixed.samples = Some(1);
+    let found = run("builtin:intersect", &visibility, &spec);
+    assert!(verify_failure(&found).is_none(), "{}", told(&found));
+    let compared =
+        |label: &str| found.techniques.iter().any(|one| one.technique == label && one.comparisons > 0);
+    assert!(compared("visibility raster"), "{:?}", found.techniques);
+    match found.left_out.iter().find(|one| one.technique == "visibility compute") {
+        Some(left_out) => {
+            afterlight_testkit::skip(afterlight_testkit::Need::ComputeVisibility, &left_out.reason)
+        }
+        None => assert!(compared("visibility compute"), "{:?}", found.techniques),
     }
 }
 
@@ -134,6 +146,15 @@ fn a_technique_that_loses_lights_is_off() {
     assert!(found.off[0].command.contains("--lights 60") && found.off[0].command.contains("--camera"));
 }
 
+/// A run that checks nothing proves nothing.
+#[test]
+fn no_view_is_no_success() {
+    let one = [Chosen::new(technique("techniques", "deferred").expect("is there"))];
+    let found = run("builtin:floor", &one, &VerifySpec { seconds: Some(1e-9), ..small(4, 9) });
+    assert_eq!((found.views, found.off_count), (0, 0));
+    assert!(verify_failure(&found).is_some_and(|why| why.contains("no view was checked")));
+}
+
 /// Views of one seed are the same whoever draws them.
 #[test]
 fn views_may_be_shared_among_programs() {
@@ -146,16 +167,5 @@ fn views_may_be_shared_among_programs() {
     assert_eq!(all.comparisons, halves.iter().map(|half| half.comparisons).sum::<u64>());
     assert_eq!(all.probes.surfaces, halves.iter().map(|half| half.probes.surfaces).sum::<u64>());
     let least = |found: &Verification| found.techniques[0].least_margin_db;
-    assert_eq!(least(&all), least(&halves[0]).min_by_db(least(&halves[1])));
-}
-
-/// The lesser of two margins.
-trait MinByDb {
-    fn min_by_db(self, other: Self) -> Self;
-}
-
-impl MinByDb for Option<f64> {
-    fn min_by_db(self, other: Self) -> Self {
-        self.zip(other).map(|(a, b)| a.min(b))
-    }
+    assert_eq!(least(&all), least(&halves[0]).zip(least(&halves[1])).map(|(a, b)| a.min(b)));
 }

@@ -66,7 +66,7 @@ pub struct Probes {
     pub surfaces: u64,
     /// Pixels whose radiance was judged as well.
     pub radiances: u64,
-    /// Pixels of which nothing can be said: 32-bit floats move their surfaces by more than a pixel.
+    /// Pixels of which nothing can be said: 32-bit floats move their surfaces by more than a pixel and a half.
     pub unjudged: u64,
     /// Pixels that are off.
     pub off: u64,

@@ -43,6 +43,13 @@ pub struct Hit {
     pub edge_distance: f64,
 }
 
+impl Hit {
+    /// The triangle that is met: instance, and triangle of its mesh.
+    pub fn place(&self) -> (u32, u32) {
+        (self.instance, self.triangle)
+    }
+}
+
 /// Interpolated attributes of a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Attributes {
@@ -62,6 +69,8 @@ pub struct Attributes {
 
 struct Triangle {
     corners_ws: [DVec3; 3],
+    /// Whether its instance is mirrored, which turns its front.
+    mirrored: bool,
     instance: u32,
     triangle: u32,
 }
@@ -94,13 +103,10 @@ impl<'a> RayScene<'a> {
                 AlphaMode::Blend => &mut blended,
                 _ => &mut triangles,
             };
-            let world_from_object = widened(instance);
+            let mirrored = widened(instance).determinant() < 0.0;
             for triangle in 0..mesh.index_count / 3 {
-                let corners_ws = corner_vertices(scene, instance, triangle).map(|vertex| {
-                    let p = scene.positions_os[vertex].map(f64::from);
-                    world_from_object.transform_point3(DVec3::from_array(p))
-                });
-                of_kind.push(Triangle { corners_ws, instance: i as u32, triangle });
+                let corners_ws = corners_ws(scene, instance, triangle);
+                of_kind.push(Triangle { corners_ws, mirrored, instance: i as u32, triangle });
             }
         }
         let mut nodes = Vec::new();
@@ -120,33 +126,38 @@ impl<'a> RayScene<'a> {
     /// reaches the cutoff.
     pub fn first_hit(&self, ray: &Ray) -> Option<Hit> {
         let mut best: Option<Hit> = None;
-        let mut stack = vec![0usize];
-        while let Some(n) = stack.pop() {
-            let Some(node) = self.nodes.get(n) else { continue };
-            let farthest_m = best.map_or(ray.range_m[1], |hit| hit.distance_m);
-            if !meets_box(node, ray, farthest_m) {
-                continue;
+        self.walk(ray, |hit| {
+            let is_nearer = best.is_none_or(|best| hit.distance_m < best.distance_m);
+            if is_nearer && self.is_there(&hit) {
+                best = Some(hit);
             }
-            if node.count == 0 {
-                stack.extend([node.first as usize, n + 1]);
-                continue;
-            }
-            for triangle in &self.triangles[node.first as usize..][..node.count as usize] {
-                let nearest_m = best.map_or(f64::INFINITY, |hit| hit.distance_m);
-                if let Some(hit) =
-                    self.meets(triangle, ray).filter(|hit| hit.distance_m < nearest_m && self.is_there(hit))
-                {
-                    best = Some(hit);
-                }
-            }
-        }
+            best.map_or(ray.range_m[1], |best| best.distance_m)
+        });
         best
     }
 
     /// Surfaces without alpha blending along a ray, from near to far, up to the first one that is not doubtful; masked ones whatever their alpha,
     /// so `is_doubtful` must say so of them.
     pub fn surfaces(&self, ray: &Ray, is_doubtful: impl Fn(&Hit) -> bool) -> Vec<Hit> {
-        let mut hits: Vec<Hit> = Vec::new();
+        let (mut hits, mut farthest_m) = (Vec::new(), ray.range_m[1]);
+        self.walk(ray, |hit| {
+            if hit.distance_m <= farthest_m {
+                if !is_doubtful(&hit) {
+                    farthest_m = hit.distance_m;
+                }
+                hits.push(hit);
+            }
+            farthest_m
+        });
+        hits.sort_by(|a, b| a.distance_m.total_cmp(&b.distance_m));
+        let closed = hits.iter().position(|hit| !is_doubtful(hit));
+        hits.truncate(closed.map_or(hits.len(), |last| last + 1));
+        hits
+    }
+
+    /// Visits surfaces without alpha blending that a ray meets, in no order, as far as a visit says: it returns the view distance beyond which
+    /// nothing is asked for.
+    fn walk(&self, ray: &Ray, mut visit: impl FnMut(Hit) -> f64) {
         let mut farthest_m = ray.range_m[1];
         let mut stack = vec![0usize];
         while let Some(n) = stack.pop() {
@@ -159,19 +170,11 @@ impl<'a> RayScene<'a> {
                 continue;
             }
             for triangle in &self.triangles[node.first as usize..][..node.count as usize] {
-                let Some(hit) = self.meets(triangle, ray).filter(|hit| hit.distance_m <= farthest_m) else {
-                    continue;
-                };
-                if !is_doubtful(&hit) {
-                    farthest_m = hit.distance_m;
+                if let Some(hit) = self.meets(triangle, ray) {
+                    farthest_m = visit(hit);
                 }
-                hits.push(hit);
             }
         }
-        hits.sort_by(|a, b| a.distance_m.total_cmp(&b.distance_m));
-        let closed = hits.iter().position(|hit| !is_doubtful(hit));
-        hits.truncate(closed.map_or(hits.len(), |last| last + 1));
-        hits
     }
 
     /// Surfaces with alpha blending along a ray before a view distance, from far to near.
@@ -210,9 +213,8 @@ impl<'a> RayScene<'a> {
         if !(u >= 0.0 && v >= 0.0 && u + v <= 1.0 && in_range) {
             return None;
         }
-        // positive if the corners run counter-clockwise; a mirrored instance flips the sign
-        let mirrored = widened(&self.scene.instances[triangle.instance as usize]).determinant() < 0.0;
-        let front = (determinant > 0.0) != mirrored;
+        // positive if the corners run counter-clockwise
+        let front = (determinant > 0.0) != triangle.mirrored;
         if !front && !self.material(triangle.instance).double_sided {
             return None;
         }
@@ -233,7 +235,7 @@ impl<'a> RayScene<'a> {
         self.base_color(material, &self.attributes(hit)).w >= f64::from(cutoff)
     }
 
-    /// Linear base colour and alpha. Textures that are files count as white: see [`RayScene::has_unread_textures`].
+    /// Linear base colour and alpha. Textures that are files count as white.
     fn base_color(&self, material: &Material, at: &Attributes) -> DVec4 {
         let factor = DVec4::from_array(material.base_color_factor.map(f64::from));
         factor * at.color * self.sample(material.base_color_texture.as_ref(), at, true).unwrap_or(DVec4::ONE)
@@ -248,14 +250,6 @@ impl<'a> RayScene<'a> {
         let texture = texture?;
         let uv = transformed_uv(texture, at.uv[usize::from(texture.uv_set == 1)]);
         sample_finest(&self.scene.images[texture.image as usize], &texture.sampler, uv, srgb)
-    }
-
-    /// Whether a material of an instance has textures that are files: those are not read here, so shading is that of the
-    /// factors alone.
-    pub fn has_unread_textures(&self, instance: u32) -> bool {
-        self.material(instance).textures().any(|t| {
-            !matches!(self.scene.images[t.image as usize].data, afterlight_scene::ImageData::Rgba8 { .. })
-        })
     }
 
     /// Interpolates the attributes of a hit. Normals and tangents are made unit at the corners, in world space.
@@ -301,12 +295,7 @@ impl<'a> RayScene<'a> {
 
     /// Unit normal of a hit's triangle in world space, to either side.
     pub fn plane_normal_ws(&self, hit: &Hit) -> DVec3 {
-        let instance = &self.scene.instances[hit.instance as usize];
-        let world_from_object = widened(instance);
-        let [a, b, c] = corner_vertices(self.scene, instance, hit.triangle).map(|vertex| {
-            let p = self.scene.positions_os[vertex].map(f64::from);
-            world_from_object.transform_point3(DVec3::from_array(p))
-        });
+        let [a, b, c] = corners_ws(self.scene, &self.scene.instances[hit.instance as usize], hit.triangle);
         (b - a).cross(c - a).normalize_or_zero()
     }
 
@@ -403,15 +392,17 @@ fn corner_vertices(scene: &Scene, instance: &Instance, triangle: u32) -> [usize;
     [0, 1, 2].map(|k| (mesh.first_vertex + scene.indices[first + k]) as usize)
 }
 
+/// Corners of a triangle of an instance.
+fn corners_ws(scene: &Scene, instance: &Instance, triangle: u32) -> [DVec3; 3] {
+    let world_from_object = widened(instance);
+    corner_vertices(scene, instance, triangle).map(|vertex| {
+        let position_os = DVec3::from_array(scene.positions_os[vertex].map(f64::from));
+        world_from_object.transform_point3(position_os)
+    })
+}
+
 fn widened(instance: &Instance) -> DMat4 {
-    let m = instance.world_from_object;
-    let column = |v: glam::Vec3A, w: f64| glam::Vec3::from(v).as_dvec3().extend(w);
-    DMat4::from_cols(
-        column(m.matrix3.x_axis, 0.0),
-        column(m.matrix3.y_axis, 0.0),
-        column(m.matrix3.z_axis, 0.0),
-        column(m.translation, 1.0),
-    )
+    DMat4::from(instance.world_from_object.as_daffine3())
 }
 
 /// Splits at the median of the centres along the longest axis until few are left.

@@ -12,7 +12,7 @@ use crate::raster::{Hit, Ray, RayScene, ray_through};
 
 /// How far from a pixel's centre a device may sample, pixels along each axis: Vulkan requires vertices to be snapped to 1/16 pixel or finer
 /// (`subPixelPrecisionBits` of at least 4).
-pub const SNAP_PX: f64 = 1.0 / 16.0;
+const SNAP_PX: f64 = 1.0 / 16.0;
 
 /// Rounding of a position in 32-bit floats, as a fraction of the greatest coordinate: 8 units in the last place, for the products of two
 /// matrices and a sum of four terms.
@@ -26,7 +26,7 @@ const OFFSETS: [[i32; 2]; 9] = [[0, 0], [-1, -1], [0, -1], [1, -1], [-1, 0], [1,
 
 /// Depth as a device interpolates it may be off by this, of a range of 1: 16 units in the last place of depths below 1, since the plane of a large
 /// triangle is a difference of terms of that size.
-pub const DEPTH_ROUNDING: f64 = 8.0 * f32::EPSILON as f64;
+const DEPTH_ROUNDING: f64 = 8.0 * f32::EPSILON as f64;
 
 /// What the device has in a pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,8 +57,8 @@ impl Seen {
 /// A surface that a pixel may show.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Candidate {
-    instance: u32,
-    triangle: u32,
+    /// Instance, and triangle of its mesh.
+    place: (u32, u32),
     /// Least and greatest view distance of its plane at the rays, metres.
     range_m: [f64; 2],
 }
@@ -92,10 +92,10 @@ impl<'a> Judge<'a> {
         Self { rays, camera, size_px, rounding_m }
     }
 
-    /// What a pixel may show, row 0 on top; `None` where rounding moves surfaces by more than a pixel, so that nothing can be said.
+    /// What a pixel may show, row 0 on top; `None` where rounding moves surfaces by more than [`WIDEST_PX`], so that nothing can be said.
     pub fn sight(&self, pixel: [u32; 2]) -> Option<Sight> {
         let (narrow, nearest_m) = self.around(pixel, SNAP_PX);
-        let widened_px = SNAP_PX + self.rounding_m / self.pixel_width_m(nearest_m);
+        let widened_px = SNAP_PX + self.rounding_m / self.pixel_width_m(nearest_m.max(0.0));
         if widened_px > WIDEST_PX {
             return None;
         }
@@ -135,19 +135,14 @@ impl<'a> Judge<'a> {
             is_certain &= hits.len() == 1 && is_closed;
             first.push(hits.first().copied());
             for hit in &hits {
-                if sight
-                    .candidates
-                    .iter()
-                    .all(|one| (one.instance, one.triangle) != (hit.instance, hit.triangle))
-                {
+                if sight.candidates.iter().all(|one| one.place != hit.place()) {
                     let range_m = self.plane_range_m(hit, &rays);
-                    let (instance, triangle) = (hit.instance, hit.triangle);
-                    sight.candidates.push(Candidate { instance, triangle, range_m });
+                    sight.candidates.push(Candidate { place: hit.place(), range_m });
                 }
             }
         }
-        let same = |hit: &Option<Hit>| hit.map(|hit| (hit.instance, hit.triangle));
-        is_certain &= first.windows(2).all(|pair| same(&pair[0]) == same(&pair[1]));
+        let place = |hit: &Option<Hit>| hit.map(|hit| hit.place());
+        is_certain &= first.windows(2).all(|pair| place(&pair[0]) == place(&pair[1]));
         sight.certain = first[0].filter(|_| is_certain);
         let nearest_m = sight.candidates.iter().map(|one| one.range_m[0]).fold(f64::INFINITY, f64::min);
         (sight, nearest_m)
@@ -198,7 +193,7 @@ impl<'a> Judge<'a> {
 
     /// Whether no other surface is as near as a hit, as coplanar ones are: which of them shows is decided by the order of draws.
     fn is_alone(&self, hit: &Hit, ray: &Ray) -> bool {
-        let is_hit = |one: &Hit| (one.instance, one.triangle) == (hit.instance, hit.triangle);
+        let is_hit = |one: &Hit| one.place() == hit.place();
         let range_m = [ray.range_m[0], hit.distance_m * (1.0 + 1e-3)];
         let near = self.rays.surfaces(&Ray { range_m, ..*ray }, is_hit);
         let slack_m = 2.0 * self.rounding_m + 1e-5 * hit.distance_m;
@@ -222,7 +217,7 @@ impl<'a> Judge<'a> {
             if !self.is_alone(&hit, &ray) {
                 return None;
             }
-            let hit = self.rays.first_hit(&ray).filter(|one| one.triangle == hit.triangle)?;
+            let hit = self.rays.first_hit(&ray).filter(|one| one.place() == hit.place())?;
             let surface = self.rays.surface(&hit);
             if surface.normal_ws.length_squared() < 0.5 {
                 return None;
@@ -252,7 +247,7 @@ impl Sight {
         let surface = |one: &Candidate| {
             format!(
                 "triangle {} of instance {} at {:.6} to {:.6} m",
-                one.triangle, one.instance, one.range_m[0], one.range_m[1]
+                one.place.1, one.place.0, one.range_m[0], one.range_m[1]
             )
         };
         let mut parts: Vec<String> = self.candidates.iter().take(3).map(surface).collect();

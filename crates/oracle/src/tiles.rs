@@ -107,13 +107,5 @@ pub fn light_reaches(light: &Light, point_ws: DVec3) -> bool {
 
 /// Camera to world, widened.
 pub(crate) fn world_from_view(camera: &Camera) -> DMat4 {
-    let m = camera.world_from_view;
-    let column = |v: glam::Vec3A, w: f64| glam::Vec3::from(v).as_dvec3().extend(w);
-    let axes = m.matrix3;
-    DMat4::from_cols(
-        column(axes.x_axis, 0.0),
-        column(axes.y_axis, 0.0),
-        column(axes.z_axis, 0.0),
-        column(m.translation, 1.0),
-    )
+    DMat4::from(camera.world_from_view.as_daffine3())
 }

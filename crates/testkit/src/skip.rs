@@ -25,6 +25,8 @@ pub enum Need {
     Timestamps,
     /// Pipeline statistics.
     Statistics,
+    /// What visibility by rasterisation in compute takes: atomics of 64 bits.
+    ComputeVisibility,
     /// A binding of more than 128 MiB.
     LargeBindings,
     /// A limit that a test can reach with the memory there is.
@@ -43,6 +45,7 @@ impl Need {
             Self::SubgroupSizes => "subgroup-sizes",
             Self::Timestamps => "timestamps",
             Self::Statistics => "statistics",
+            Self::ComputeVisibility => "compute-visibility",
             Self::LargeBindings => "large-bindings",
             Self::ReachableLimit => "reachable-limit",
         }

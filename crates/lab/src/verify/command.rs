@@ -3,9 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use afterlight_techniques::{Effects, ParamSet as _};
-
-use crate::{Chosen, FrameSpec};
+use crate::{Chosen, FrameSpec, effects};
 
 /// Parameters that are not as they are by default.
 pub fn changed(chosen: &Chosen) -> BTreeMap<String, String> {
@@ -38,13 +36,7 @@ pub fn compare_command(source: &str, spec: &FrameSpec, chosen: &Chosen) -> Strin
     if let Some(device) = &spec.device {
         option("device", device.clone());
     }
-    // One option may set parameters of several effects.
-    let usual = Effects::default().infos();
-    let effects: BTreeMap<&str, String> = (spec.effects.described().into_iter().zip(usual))
-        .filter(|(now, usual)| now.default != usual.default)
-        .map(|(now, _)| (now.key, now.default))
-        .collect();
-    for (key, value) in effects {
+    for (key, value) in effects::changed(&spec.effects) {
         option(key, value);
     }
     for (key, value) in changed(chosen) {

@@ -1,7 +1,7 @@
 //! Random views and settings: every technique and way of visibility against the reference, sampled pixels of the reference against rays in
 //! f64.
 //!
-//! [`draw`] draws the view of a seed and a number, purely; [`verify`] renders it with the reference, with every variant of every technique, and
+//! A view is drawn from a seed and its number, purely; [`verify`] renders it with the reference, with every variant of every technique, and
 //! compares. What is off, and what comes nearest to its bound, is a [`Finding`] with the command that repeats it.
 
 mod command;
@@ -17,16 +17,17 @@ use afterlight_measure::{
     Difference, Finding, LeftOut, Margin, PSNR_IDENTICAL_DB, Probes, SCHEMA, Status, Verification,
 };
 use afterlight_oracle::raster::RayScene;
-use afterlight_renderer::Renderer;
+use afterlight_renderer::{Prepared, Renderer};
 use afterlight_scene::Scene;
 use afterlight_scene::rng::SplitMix64;
-use afterlight_techniques::{Indirect, Settings, Shadows, TechniqueError};
+use afterlight_techniques::{Counter, Indirect, Settings, Shadows, TechniqueError};
 
-pub use command::{changed, compare_command};
-pub use variants::{Variant, variants};
-pub use view::{Fixed, Place, Stage, View, draw};
+use command::{changed, compare_command};
+use variants::{Variant, variants};
+pub use view::Fixed;
+use view::{Stage, View, draw};
 
-use crate::compare::least_psnr_db;
+use crate::compare::{least_psnr_db, shortfall};
 use crate::session::settings_of;
 use crate::spec::SAMPLES;
 use crate::trial::status_of;
@@ -39,7 +40,7 @@ const REFERENCE: &str = "forward";
 const SAMPLES_MAX: u32 = 8;
 
 /// Least difference of a channel, of 255, at which a pixel is marked as off.
-pub const MARKED_FROM: u8 = 4;
+const MARKED_FROM: u8 = 4;
 
 /// Findings within their bounds that are kept.
 const NEAREST_KEPT: usize = 5;
@@ -118,16 +119,13 @@ pub fn verify(
         task.advance();
     }
     drop(task);
-    let Found { views, comparisons, mut margins, probes, left_out, mut off, off_count, nearest } =
-        check.found;
+    let Found { views, comparisons, mut margins, probes, left_out, off, off_count, nearest } = check.found;
     // In the order of the techniques, whatever the first views could render.
     let order = |margin: &Margin| {
         let id = margin.technique.split(' ').next();
         techniques.iter().position(|one| Some(one.id()) == id)
     };
     margins.sort_by_key(order);
-    off.sort_by(worst_first);
-    off.truncate(spec.worst);
     let left_out = left_out.into_iter();
     Ok(Verification {
         schema: SCHEMA,
@@ -151,11 +149,14 @@ pub fn verify(
 
 /// Why a verification has failed; none where all is well.
 pub fn verify_failure(verification: &Verification) -> Option<String> {
+    let Verification { off_count, comparisons, views, .. } = verification;
+    if *views == 0 {
+        return Some("no view was checked: the time was up before the first".to_owned());
+    }
     let first = verification.off.first()?;
     let reason = first.reason.as_deref().unwrap_or("no reason given");
-    let Verification { off_count, comparisons, views, .. } = verification;
     Some(format!(
-        "{off_count} of {comparisons} comparisons of {views} views are off; view {}, {}: {reason}",
+        "{off_count} off in {views} views with {comparisons} comparisons; view {}, {}: {reason}",
         first.view, first.technique
     ))
 }
@@ -177,6 +178,13 @@ struct Found {
 fn worst_first(a: &Finding, b: &Finding) -> std::cmp::Ordering {
     let margin_db = |finding: &Finding| finding.margin_db.unwrap_or(f64::NEG_INFINITY);
     margin_db(a).total_cmp(&margin_db(b))
+}
+
+/// Adds a finding to those that are kept, the worst first.
+fn keep_worst(kept: &mut Vec<Finding>, finding: Finding, most: usize) {
+    kept.push(finding);
+    kept.sort_by(worst_first);
+    kept.truncate(most);
 }
 
 /// A check under way.
@@ -262,13 +270,7 @@ impl Check<'_> {
             Some(Difference { psnr_db: psnr, max_abs: max_abs(truth, &image)?.into(), flip: None });
         finding.margin_db = Some(margin_db);
         finding.pixels_off = pixels_off(truth, &image, MARKED_FROM)?;
-        let reason = match dropped {
-            Some(dropped) => Some(dropped),
-            None if margin_db < 0.0 => {
-                Some(format!("PSNR to {REFERENCE}: found {psnr:.1} dB, expected at least {bound_db:.1} dB"))
-            }
-            None => None,
-        };
+        let reason = dropped.or_else(|| shortfall(REFERENCE, psnr, bound_db));
         self.count(label, view.index, Some(margin_db), reason.is_some());
         if reason.is_some() {
             let picture = marked_sheet(truth, &image, MARKED_FROM)?;
@@ -277,9 +279,7 @@ impl Check<'_> {
         if psnr >= PSNR_IDENTICAL_DB {
             return Ok(());
         }
-        self.found.nearest.push(finding);
-        self.found.nearest.sort_by(worst_first);
-        self.found.nearest.truncate(NEAREST_KEPT);
+        keep_worst(&mut self.found.nearest, finding, NEAREST_KEPT);
         Ok(())
     }
 
@@ -295,8 +295,17 @@ impl Check<'_> {
         let mut plain = Settings { samples: 1, keep_hdr: true, keep_depth: true, ..settings.clone() };
         plain.effects.shadows.method = Shadows::None;
         plain.effects.indirect.method = Indirect::None;
-        let mut prepared = self.renderer(&plain)?.prepare(reference.technique, &reference.params)?;
-        prepared.run()?;
+        let renderer = self.renderer(&plain)?;
+        let mut prepared = match ready(&renderer, reference) {
+            Ok(prepared) => prepared,
+            Err(error @ (TechniqueError::Scene(_) | TechniqueError::TooLarge { .. })) => {
+                return Err(error.into());
+            }
+            Err(error) => {
+                let finding = self.finding(&plain_view(view), reference, 0.0);
+                return self.add_off(finding, Some(error.to_string()), None);
+            }
+        };
         let (Some(depth), Some(radiance)) = (prepared.depth()?, prepared.hdr_rgba()?) else {
             return Err(LabError::BrokeOff {
                 what: REFERENCE.to_owned(),
@@ -312,11 +321,7 @@ impl Check<'_> {
         probes.unjudged += judged.probes.unjudged;
         probes.off += judged.probes.off;
         let Some((pixel, reason)) = judged.off.first() else { return Ok(()) };
-        let mut plain_spec = view.spec.clone();
-        plain_spec.samples = 1;
-        plain_spec.effects.shadows = Default::default();
-        plain_spec.effects.indirect = Default::default();
-        let mut finding = self.finding(&View { spec: plain_spec, ..view.clone() }, reference, 0.0);
+        let mut finding = self.finding(&plain_view(view), reference, 0.0);
         finding.pixels_off = judged.probes.off;
         let reason = format!(
             "rays in f64: pixel {},{} {reason}; {} of {} pixels off",
@@ -362,7 +367,7 @@ impl Check<'_> {
             finding.picture = (self.album)(&finding, picture)?;
         }
         self.found.off_count += 1;
-        self.found.off.push(finding);
+        keep_worst(&mut self.found.off, finding, self.spec.worst);
         Ok(())
     }
 
@@ -389,6 +394,15 @@ impl Check<'_> {
     }
 }
 
+/// What rays judge of a view: one sample a pixel, without shadows and indirect light.
+fn plain_view(view: &View) -> View {
+    let mut plain = view.clone();
+    plain.spec.samples = 1;
+    plain.spec.effects.shadows = Default::default();
+    plain.spec.effects.indirect = Default::default();
+    plain
+}
+
 /// A frame of a technique.
 struct Frame {
     image: Rgba8Image,
@@ -396,15 +410,17 @@ struct Frame {
     dropped: Option<String>,
 }
 
-fn render(renderer: &Renderer, chosen: &Chosen) -> Result<Frame, TechniqueError> {
+/// A technique whose frame has been run.
+fn ready(renderer: &Renderer, chosen: &Chosen) -> Result<Prepared, TechniqueError> {
     let mut prepared = renderer.prepare(chosen.technique, &chosen.params)?;
     prepared.run()?;
-    let dropped = prepared.counters()?.into_iter().find(|counter| counter.dropped > 0);
+    Ok(prepared)
+}
+
+fn render(renderer: &Renderer, chosen: &Chosen) -> Result<Frame, TechniqueError> {
+    let mut prepared = ready(renderer, chosen)?;
+    let dropped = prepared.counters()?.iter().find_map(Counter::dropped_text);
     let (width, height) = prepared.size_px();
     let image = Rgba8Image { width, height, pixels: prepared.final_rgba8()? };
-    let dropped = dropped.map(|counter| {
-        let (name, needed, capacity) = (counter.name, counter.needed, counter.capacity);
-        format!("{name}: found {needed} needed, {capacity} there; {} samples dropped", counter.dropped)
-    });
     Ok(Frame { image, dropped })
 }

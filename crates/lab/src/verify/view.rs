@@ -1,4 +1,4 @@
-//! Views that are drawn at random: pure, the same for a seed and a number on every machine.
+//! Views that are drawn at random: purely, from a seed, a number and the sample counts that a device has.
 
 use afterlight_scene::points::{SurfacePoint, surface_points};
 use afterlight_scene::rng::SplitMix64;
