@@ -51,12 +51,12 @@ static INFO: Info = Info {
         Approximation {
             when: &[Condition::SeveralSamples, Condition::Param("edge-light", "pixel")],
             bound: "surfaces at an edge are lit by the light of the surface at the pixel's centre",
-            min_psnr_db: 10.0,
+            min_psnr_db: 18.0,
         },
         Approximation {
             when: &[Condition::SeveralSamples],
             bound: "surfaces at an edge are lit by the light of the most similar surface at the centre of a pixel around",
-            min_psnr_db: 15.0,
+            min_psnr_db: 20.0,
         },
     ],
     departures: &[
