@@ -49,6 +49,15 @@ pub fn most(before: Vec<Counter>, last: Vec<Counter>) -> Vec<Counter> {
     before.into_iter().zip(last).map(more).collect()
 }
 
+impl Counter {
+    /// What found no room, in words; none where all did.
+    pub fn dropped_text(&self) -> Option<String> {
+        let Self { name, needed, capacity, dropped, .. } = self;
+        (*dropped > 0)
+            .then(|| format!("{name}: found {needed} needed, {capacity} there; {dropped} samples dropped"))
+    }
+}
+
 /// A counter on the device: two words, what was asked for and what was dropped.
 #[derive(Clone, Debug)]
 pub struct Demand {
@@ -64,6 +73,12 @@ pub struct Demand {
 }
 
 impl Demand {
+    /// Of a list whose two words begin its counter's buffer, which is recorded again where its need is more, and whose need is steady.
+    fn of(name: &'static str, resource: ResourceId, capacity: u32) -> Self {
+        let (first_word, fixed, varies) = (0, false, false);
+        Self { name, resource, first_word, capacity, fixed, slack_eighths: STEADY, varies }
+    }
+
     /// Reads the last frame's count.
     pub fn read(&self, executor: &Executor) -> Result<Counter, TechniqueError> {
         let bytes = executor.read_buffer(self.resource)?;
@@ -158,9 +173,7 @@ impl Frame<'_> {
         capacity: u32,
         fixed: bool,
     ) {
-        let resource = graph.keep(counter);
-        let demand =
-            Demand { name, resource, first_word: 0, capacity, fixed, slack_eighths: STEADY, varies: false };
+        let demand = Demand { fixed, ..Demand::of(name, graph.keep(counter), capacity) };
         self.capacities.demands.borrow_mut().push(demand);
     }
 
@@ -174,9 +187,8 @@ impl Frame<'_> {
         capacity: u32,
         slack_eighths: u32,
     ) {
-        let resource = graph.keep(counter);
-        let demand =
-            Demand { name, resource, first_word: 0, capacity, fixed: false, slack_eighths, varies: true };
+        let of = Demand::of(name, graph.keep(counter), capacity);
+        let demand = Demand { slack_eighths, varies: true, ..of };
         self.capacities.demands.borrow_mut().push(demand);
     }
 
@@ -185,13 +197,8 @@ impl Frame<'_> {
     pub fn watch_all(&self, graph: &mut Graph, counters: &BufferHandle, of: &[(&'static str, u32)]) {
         let resource = graph.keep(counters);
         let demand = |(i, (name, capacity)): (usize, &(&'static str, u32))| Demand {
-            name,
-            resource,
             first_word: 2 * i,
-            capacity: *capacity,
-            fixed: false,
-            slack_eighths: STEADY,
-            varies: false,
+            ..Demand::of(name, resource, *capacity)
         };
         self.capacities.demands.borrow_mut().extend(of.iter().enumerate().map(demand));
     }
@@ -224,15 +231,7 @@ mod tests {
     fn what_was_given_room_settles() {
         for (slack_eighths, varies) in [(STEADY, false), (STEADY, true), (UNSTEADY, true)] {
             for needed in [0, 1, 5_000, 133_822, 1 << 24] {
-                let demand = Demand {
-                    name: "blocks",
-                    resource: kept(),
-                    first_word: 0,
-                    capacity: 0,
-                    fixed: false,
-                    slack_eighths,
-                    varies,
-                };
+                let demand = Demand { slack_eighths, varies, ..Demand::of("blocks", kept(), 0) };
                 let first = Capacities { known: Vec::new(), demands: RefCell::new(vec![demand]) };
                 let room = match first.next(&[counter(needed, needed.saturating_sub(1), false)]) {
                     Some(next) => next.known[0].1,
@@ -250,15 +249,7 @@ mod tests {
     /// A sum that has passed 2³² looks small, and would be taken for a list that fits.
     #[test]
     fn a_sum_that_has_begun_anew_is_no_list_that_fits() {
-        let demand = |capacity, fixed| Demand {
-            name: "blocks",
-            resource: kept(),
-            first_word: 0,
-            capacity,
-            fixed,
-            slack_eighths: STEADY,
-            varies: false,
-        };
+        let demand = |capacity, fixed| Demand { fixed, ..Demand::of("blocks", kept(), capacity) };
         let counted = demand(100, false).counted(90, 5);
         assert_eq!((counted.needed, counted.dropped), (u32::MAX, 5));
         let next = Capacities::default().next(&[counted]).expect("no room for all");
@@ -276,15 +267,7 @@ mod tests {
     /// What varies has room for more than what was counted by chance, also where that fits.
     #[test]
     fn what_varies_has_room_for_more() {
-        let demand = |varies| Demand {
-            name: "blocks",
-            resource: kept(),
-            first_word: 0,
-            capacity: 16,
-            fixed: false,
-            slack_eighths: UNSTEADY,
-            varies,
-        };
+        let demand = |varies| Demand { slack_eighths: UNSTEADY, varies, ..Demand::of("blocks", kept(), 16) };
         let of = |varies| Capacities { known: Vec::new(), demands: RefCell::new(vec![demand(varies)]) };
         assert!(of(false).next(&[counter(8, 16, false)]).is_none());
         let next = of(true).next(&[counter(8, 16, false)]).expect("room for more");

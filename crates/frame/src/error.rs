@@ -4,6 +4,16 @@ use afterlight_graph::{GraphError, gpu::GpuError};
 use afterlight_params::ParamError;
 use afterlight_scene::SceneError;
 
+/// What the device says while a frame is planned or runs is an error of the device, whoever asked it.
+impl From<GraphError> for TechniqueError {
+    fn from(error: GraphError) -> Self {
+        match error {
+            GraphError::Gpu(error) => Self::Gpu(error),
+            error => Self::Graph(error),
+        }
+    }
+}
+
 /// An error of preparing or running a technique: one line that names what, found and expected.
 #[derive(Debug, thiserror::Error)]
 pub enum TechniqueError {
@@ -15,7 +25,7 @@ pub enum TechniqueError {
     Gpu(#[from] GpuError),
     /// The frame graph.
     #[error(transparent)]
-    Graph(#[from] GraphError),
+    Graph(GraphError),
     /// A shader name that the program does not have.
     #[error("shader {name:?}: not compiled into this program; expected one of the names in variants.txt")]
     UnknownShader {
@@ -79,4 +89,18 @@ pub enum TechniqueError {
         /// The features.
         missing: String,
     },
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A frame that finds no memory is told apart from a frame that is wrong.
+    #[test]
+    fn an_error_of_the_device_is_one_wherever_it_comes_from() {
+        let full = || GpuError::OutOfMemory { resource: "frame heap".to_owned(), bytes: 1 };
+        let through_the_graph = TechniqueError::from(GraphError::Gpu(full()));
+        assert!(matches!(through_the_graph, TechniqueError::Gpu(GpuError::OutOfMemory { .. })));
+        assert_eq!(through_the_graph.to_string(), full().to_string());
+    }
 }

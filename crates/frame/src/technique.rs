@@ -154,8 +154,7 @@ pub struct Info {
 
 impl Info {
     /// What most techniques have in common, for `..Info::USUAL` after what is a technique's own: one sample a pixel, tessellated surfaces,
-    /// no needs, no views, no
-    /// ways that are further from `forward`, no departures.
+    /// no needs, no views, no ways that are further from `forward`, no departures.
     pub const USUAL: Info = Info {
         id: "",
         title: "",

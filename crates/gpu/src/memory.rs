@@ -439,6 +439,8 @@ impl Device {
     fn check_allocation(&self, name: &str, bytes: u64, kind: MemoryKind) -> Result<(), GpuError> {
         let features = self.features();
         let room = match kind {
+            // The host is asked only about what its heap does not hold.
+            MemoryKind::DeviceLocal if bytes <= features.device_local_heap_bytes => bytes,
             MemoryKind::DeviceLocal => self.allocatable_bytes(),
             MemoryKind::Upload | MemoryKind::Readback => {
                 self.0.memory.memory_heaps_as_slice().iter().map(|h| h.size).max().unwrap_or(0)

@@ -47,6 +47,17 @@ vec3 position_from_depth(vec2 ndc, float depth) {
     return p.xyz / p.w;
 }
 
+// View distance in metres of a point, negative behind the eye.
+float distance_from_position(vec3 position_ws) {
+    return dot(frame.distance_from_world, vec4(position_ws, 1.0));
+}
+
+// Depth of a point, as the raster part computes it of a vertex.
+float depth_from_position(vec3 position_ws) {
+    vec4 p = vec4(position_ws, 1.0);
+    return dot(clip_row(2), p) / dot(clip_row(3), p);
+}
+
 // View distance in metres of a depth; infinite at depth 0 under perspective.
 float distance_from_depth(float depth) {
     vec4 k = frame.depth_to_distance;

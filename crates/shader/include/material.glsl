@@ -36,6 +36,15 @@ struct TextureCoordinates {
     vec2 ddy;
 };
 
+// Whether the plane of a triangle nearly ends in a pixel, at its horizon: 1/w changes by this fraction of it from one pixel to the next.
+// Texture coordinates have no one rate of change there, and take the differences that a quad of fragments has, by which forward shading chooses
+// its mip level.
+const float STEEP_CHANGE = 0.125;
+
+bool is_steep(float inverse_w, vec2 change) {
+    return max(abs(change.x), abs(change.y)) > STEEP_CHANGE * abs(inverse_w);
+}
+
 // Attributes interpolated at a point of a triangle.
 struct SurfacePoint {
     vec3 position_ws;

@@ -47,9 +47,10 @@ Barycentrics barycentrics_at(vec2 ndc, vec3 p0, vec3 p1, vec3 p2) {   // p: clip
     r.counter_clockwise = dot(b, w) < 0.0;
     float inv = 1.0 / sum;
     r.at = b * inv;
-    r.inverse_w_change = vec2(bx.x + bx.y + bx.z, by.x + by.y + by.z) * (inv * pixel_ndc);
-    r.ddx = (bx - r.at * (bx.x + bx.y + bx.z)) * (inv * pixel_ndc.x);
-    r.ddy = (by - r.at * (by.x + by.y + by.z)) * (inv * pixel_ndc.y);
+    vec2 sum_change = vec2(bx.x + bx.y + bx.z, by.x + by.y + by.z);
+    r.inverse_w_change = sum_change * (inv * pixel_ndc);
+    r.ddx = (bx - r.at * sum_change.x) * (inv * pixel_ndc.x);
+    r.ddy = (by - r.at * sum_change.y) * (inv * pixel_ndc.y);
     return r;
 }
 
@@ -126,14 +127,6 @@ void take_quad_gradients(uint id, uvec2 pixel, inout SurfacePoint p) {
     }
 }
 
-// A pixel that the triangle's plane nearly ends in, at its horizon, has no one rate of change: 1/w changes by this fraction within it.
-// There texture coordinates change as a quad of fragments has it, by which `forward` chooses its mip level.
-const float STEEP_CHANGE = 0.125;
-
-bool is_steep(vec2 inverse_w_change) {
-    return max(abs(inverse_w_change.x), abs(inverse_w_change.y)) > STEEP_CHANGE;
-}
-
 SurfacePoint triangle_point(uint id, vec2 ndc, out uint material) {
     DrawData d = load_draw(draw_data, id >> TRIANGLE_BITS);
     material = d.material;
@@ -157,7 +150,7 @@ SurfacePoint triangle_point(uint id, vec2 ndc, out uint material) {
     if (HAS_UV1 != 0u) {
         p.uv1 = interpolate_uv(b, load_uv(a.x, 4u), load_uv(a.y, 4u), load_uv(a.z, 4u));
     }
-    if (is_steep(b.inverse_w_change)) {
+    if (is_steep(1.0, b.inverse_w_change)) {
         take_quad_gradients(id, uvec2((ndc * 0.5 + 0.5) * vec2(frame.size_px)), p);
     }
     p.color = vec4(1.0);

@@ -446,13 +446,15 @@ fn count_pairs(session: &Session, setup: &Setup) -> Result<RunResult, LabError> 
     }))
 }
 
+/// Whether a set-up gives the image of `forward`.
+fn is_exact(setup: &Setup) -> bool {
+    let exactness = exactness_of(setup.chosen.technique, &setup.chosen.params, setup.samples);
+    matches!(exactness, Exactness::Exact { .. })
+}
+
 /// Lit pairs of a frame: those of the first exact technique at the fewest samples.
 fn lit_pairs(setups: &[Setup], pairs: &[Option<Pairs>]) -> Option<f64> {
-    let exact = |setup: &Setup| {
-        let exactness = exactness_of(setup.chosen.technique, &setup.chosen.params, setup.samples);
-        matches!(exactness, Exactness::Exact { .. })
-    };
-    let counted = setups.iter().zip(pairs).filter(|(setup, _)| exact(setup));
+    let counted = setups.iter().zip(pairs).filter(|(setup, _)| is_exact(setup));
     let counted = counted.filter_map(|(setup, pairs)| Some((setup.samples, (*pairs)?.lit)));
     counted.min_by_key(|(samples, _)| *samples).map(|(_, lit)| lit)
 }
@@ -460,14 +462,10 @@ fn lit_pairs(setups: &[Setup], pairs: &[Option<Pairs>]) -> Option<f64> {
 /// Marks exact techniques as failed that light fewer pairs than others of as many samples: some of their lights are lost, to a bound of the
 /// device or of their lists.
 fn judge_lit(setups: &[Setup], results: &mut [RunResult], pairs: &[Option<Pairs>]) {
-    let exact = |setup: &Setup| {
-        let exactness = exactness_of(setup.chosen.technique, &setup.chosen.params, setup.samples);
-        matches!(exactness, Exactness::Exact { .. })
-    };
-    for (index, setup) in setups.iter().enumerate().filter(|(_, setup)| exact(setup)) {
+    for (index, setup) in setups.iter().enumerate().filter(|(_, setup)| is_exact(setup)) {
         let Some(found) = pairs[index].filter(|_| results[index].status == Status::Ok) else { continue };
         let alike =
-            setups.iter().zip(pairs).filter(|(other, _)| exact(other) && other.samples == setup.samples);
+            setups.iter().zip(pairs).filter(|(other, _)| is_exact(other) && other.samples == setup.samples);
         let most = alike.filter_map(|(_, pairs)| Some((*pairs)?.lit)).fold(0.0, f64::max);
         if found.lit < LEAST_LIT * most {
             results[index].status = Status::Failed;

@@ -31,13 +31,6 @@ impl ComputePass<'_> {
         self
     }
 
-    /// Has the pass run in subgroups of `invocations`, which are full where the group's width is a multiple of it. The device must offer
-    /// that size (`gpu::Features::offers_subgroup_size`). Without, the driver chooses.
-    pub fn subgroup_size(&mut self, invocations: u32) -> &mut Self {
-        self.node().subgroup_size = Some(invocations);
-        self
-    }
-
     /// Sets the push constants of the dispatches that follow.
     pub fn push<T: bytemuck::NoUninit>(&mut self, value: &T) -> &mut Self {
         self.node().push = bytemuck::bytes_of(value).to_vec();

@@ -193,7 +193,7 @@ impl Graph {
         ComputePass { graph: self, pass }
     }
 
-    /// Has the compute passes of that name, declared before, run in subgroups of `invocations`: see [`ComputePass::subgroup_size`]. For
+    /// Has the compute passes of that name, declared before, run in subgroups of `invocations`. For
     /// tests that give a stage every size that a device offers. Returns whether there is such a pass.
     pub fn set_subgroup_size(&mut self, pass: &str, invocations: u32) -> bool {
         let mut found = false;

@@ -127,6 +127,11 @@ static INFO: Info = Info {
     // Texture gradients are analytic.
     exactness: Exactness::Exact { min_psnr_db: 45.0 },
     approximations: &[DERIVATIVE_TANGENTS],
+    departures: &[
+        "the triangle buffer is filled once the visibility buffer is finished, each triangle once; the paper's memoization cache is fill=cache",
+        KEPT_TANGENTS,
+        "derivatives are homogeneous, so that triangles behind the eye need no clip",
+    ],
     samples: ANY_SAMPLES,
     views: views::TRIANGLES,
     ..Info::USUAL
@@ -166,6 +171,9 @@ pub(crate) const DERIVATIVE_TANGENTS: Approximation = Approximation {
     bound: "normal maps are turned where texture coordinates bend, have no area or are not those of the file's tangents",
     min_psnr_db: 10.0,
 };
+
+/// What records hold beyond the paper's, of every technique of this family.
+pub(crate) const KEPT_TANGENTS: &str = "records keep the vertices' tangents in scenes with normal maps; the paper's, found from derivatives, are tangents=derivatives";
 
 /// How a technique of this family shades what it has found.
 pub(crate) struct Asked {

@@ -2,8 +2,8 @@
 
 use afterlight_cost::{Cost, Workload};
 
-/// The project's own: [`dais`](crate::dais::cost::dais) with a float a sample (depth), a float a pixel (the head) and two a surface where a pixel shows
-/// several; the scene is drawn twice.
+/// The project's own: [`dais`](crate::dais::cost::dais) with a float a sample (depth), a float a pixel (the head) and two a surface where
+/// a pixel shows several; the scene is drawn twice.
 pub fn dais_list(w: &Workload, record_floats: f64) -> Cost {
     let (stored, shaded) = (w.shading_samples, w.expected_samples);
     let triangles = (w.object_vertices / 3.0).min(w.pixels * shaded);

@@ -63,6 +63,11 @@ static INFO: Info = Info {
     exactness: Exactness::Exact { min_psnr_db: 45.0 },
     needs: &[Need { name: "post-depth coverage", test: |features| features.post_depth_coverage }],
     approximations: &[dais::DERIVATIVE_TANGENTS],
+    departures: &[
+        "entries of lists refer to triangles by their IDs, and the first of a pixel takes no node",
+        "the image is drawn in bands, so that depth at the samples is held for one of them; the paper's single one is bands=1",
+        dais::KEPT_TANGENTS,
+    ],
     samples: MULTIPLE_SAMPLES,
     views: views::TRIANGLES,
     ..Info::USUAL

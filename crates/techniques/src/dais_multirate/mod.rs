@@ -41,6 +41,11 @@ static INFO: Info = Info {
         min_psnr_db: 40.0,
     },
     approximations: &[dais::DERIVATIVE_TANGENTS],
+    departures: &[
+        "indirect light alone is shaded at the low rate, and what is shared is irradiance: the material stays at full rate",
+        "the visibility buffer is finished before shading, so that the paper's second one and its pass are not needed",
+        dais::KEPT_TANGENTS,
+    ],
     samples: &[1, 2, 4, 8],
     views: views::TRIANGLES,
     ..Info::USUAL

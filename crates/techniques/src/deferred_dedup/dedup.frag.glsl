@@ -4,7 +4,8 @@
 //
 // Out, RGBA8 each, since some devices have no multisampled integer formats: 0 base colour (sRGB) and metalness; 1 normal, world
 // space, octahedral, 2 x 12 bits, and roughness (0: takes no light); 2 triangle ID; 3 view distance, m, at the pixel's
-// centre, 24 bits as distance.glsl has them, and occlusion; with EMISSION 4 radiance, B10G11R11. With NUMBERED surfaces/geometry/number.geom has numbered the triangles that tessellation made.
+// centre, 24 bits as distance.glsl has them, and occlusion; with EMISSION 4 radiance, B10G11R11. With NUMBERED
+// surfaces/geometry/number.geom has numbered the triangles that tessellation made.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shading.glsl"
@@ -31,7 +32,7 @@ void main() {
     uint id = draw_material.x << TRIANGLE_BITS | uint(gl_PrimitiveID);
 #endif
     triangle_id = unpackUnorm4x8(id);
-    uint distance_bits = word_from_distance(dot(frame.distance_from_world, vec4(s.position_ws, 1.0)));
+    uint distance_bits = word_from_distance(distance_from_position(s.position_ws));
     distance_occlusion = unpackUnorm4x8(distance_bits | uint(round(s.occlusion * 255.0)) << 24);
 #ifdef EMISSION
     emission = s.unlit ? vec3(0.0) : s.emission;

@@ -162,7 +162,7 @@ void main() {
         SurfacePoint point = triangle_point(triangle_id(current.id), ndc_from_pixel(uvec2(pixel)), material);
         MaterialData m = load_material(material);
         Surface s = surface_at(m, point, base_color_at(m, point).rgb);
-        float distance_m = dot(frame.distance_from_world, vec4(s.position_ws, 1.0));
+        float distance_m = distance_from_position(s.position_ws);
         store_block(block, s, distance_m, own);
 
         Visible next = next_stored(mask);

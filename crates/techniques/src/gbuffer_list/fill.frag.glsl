@@ -17,7 +17,7 @@ layout(post_depth_coverage) in;
 
 void main() {
     Surface s = visible_surface();
-    float distance_m = dot(frame.distance_from_world, vec4(s.position_ws, 1.0));
+    float distance_m = distance_from_position(s.position_ws);
 
     ivec2 pixel = ivec2(gl_FragCoord.xy);
     uint head = pixel_block(pixel);

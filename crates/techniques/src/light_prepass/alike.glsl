@@ -16,8 +16,7 @@ struct FragmentPlane {
 };
 
 FragmentPlane fragment_plane(vec3 position_ws) {
-    vec4 p = vec4(position_ws, 1.0);
-    float depth = dot(clip_row(2), p) / dot(clip_row(3), p);
+    float depth = depth_from_position(position_ws);
     float pixel_m = 0.5 * (length(dFdx(position_ws)) + length(dFdy(position_ws)));
     return FragmentPlane(depth, vec2(dFdx(depth), dFdy(depth)), max(pixel_m, 1e-20));
 }

@@ -62,7 +62,7 @@ bool is_outside(vec4 plane, vec3 centre, vec3 half_size) {
 
 bool cell_touches_box(CellBounds b, LightBox box) {
     vec3 centre = 0.5 * (box.low + box.high), half_size = 0.5 * (box.high - box.low);
-    float distance_m = dot(frame.distance_from_world, vec4(centre, 1.0));
+    float distance_m = distance_from_position(centre);
     float reach_m = dot(abs(frame.distance_from_world.xyz), half_size);
     return all(lessThanEqual(box.low, b.high_ws)) && all(greaterThanEqual(box.high, b.low_ws)) &&
            distance_m + reach_m >= b.low.z && distance_m - reach_m <= b.high.z &&

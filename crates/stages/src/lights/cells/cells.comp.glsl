@@ -4,6 +4,7 @@
 // them; CellCount: cells in all, and those without room. Numbers of cells depend on the order in which groups run; lists do not.
 #version 460
 #extension GL_GOOGLE_include_directive : require
+#include "group_rows.glsl"
 #include "lights/cells/grid.glsl"
 #include "source"
 
@@ -116,7 +117,7 @@ void write_cell(uint place, Cell cell) {
 }
 
 void main() {
-    uint tile = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x, thread = gl_LocalInvocationIndex;
+    uint tile = group_number(), thread = gl_LocalInvocationIndex;
     if (tile >= tile_count()) {
         return;
     }

@@ -41,7 +41,7 @@ vec3 lights_radiance(ShadingPoint p, uvec2 pixel, float distance_m) {
 vec3 stepped_radiance(Surface s, uvec2 pixel) {
     vec3 radiance = unlit_radiance(s);
     if (!s.unlit) {
-        float distance_m = dot(frame.distance_from_world, vec4(s.position_ws, 1.0));
+        float distance_m = distance_from_position(s.position_ws);
         radiance += lights_radiance(shading_point(s), pixel, distance_m);
     }
     return radiance;

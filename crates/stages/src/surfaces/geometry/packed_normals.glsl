@@ -1,7 +1,7 @@
-// The normals and tangents of a triangle's three vertices. Normals in four words: directions, octahedral, 2 x 16 bits each; then their lengths over that of the
-// longest, 3 x 10 bits. Normals of displaced surfaces are not of unit length, and interpolation weighs them by their lengths: unit ones
-// bend otherwise. A tangent takes two words, four halves: the tangent over the length of the longest normal, so that it keeps its
-// ratio to the normals, and the bitangent's sign times that length, since the bitangent is a product of both.
+// The normals and tangents of a triangle's three vertices. Normals in four words: directions, octahedral, 2 x 16 bits each; then their
+// lengths over that of the longest, 3 x 10 bits. Normals of displaced surfaces are not of unit length, and interpolation weighs them by
+// their lengths: unit ones bend otherwise. A tangent takes two words, four halves: the tangent over the length of the longest normal, so
+// that it keeps its ratio to the normals, and the bitangent's sign times that length, since the bitangent is a product of both.
 #ifndef AFTERLIGHT_PACKED_NORMALS
 #define AFTERLIGHT_PACKED_NORMALS
 #include "packing.glsl"

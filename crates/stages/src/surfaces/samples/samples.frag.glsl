@@ -23,7 +23,7 @@ layout(location = 3) out vec3 emission;
 void main() {
     // Derivatives come before an alpha test may end neighbours of the fragment.
     vec3 pixel = fwidth(position_ws);
-    float depth = dot(clip_row(2), vec4(position_ws, 1.0)) / dot(clip_row(3), vec4(position_ws, 1.0));
+    float depth = depth_from_position(position_ws);
     float depth_change = abs(dFdx(depth)) + abs(dFdy(depth));
     Surface s = visible_surface();
     base_color_metallic = vec4(s.base_color, s.metallic);

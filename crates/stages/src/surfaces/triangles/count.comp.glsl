@@ -5,6 +5,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
+#include "group_rows.glsl"
 #include "group_sum.glsl"
 #include "surfaces/triangles/blocks.glsl"
 
@@ -22,7 +23,7 @@ layout(constant_id = 10) const uint DRAWS = 0u;
 const uint WORDS_A_THREAD = 4u;
 
 void main() {
-    uint block = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
+    uint block = group_number();
     uint first = block * BLOCK_WORDS + gl_LocalInvocationID.x * WORDS_A_THREAD;
     uint end = min(first + WORDS_A_THREAD, DRAWS * WORDS_A_DRAW);
     uint own = 0u;

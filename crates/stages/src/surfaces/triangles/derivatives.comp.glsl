@@ -10,6 +10,7 @@
 // DispatchGroups of scan.comp.glsl, with LISTED of size.comp.glsl.
 #version 460
 #extension GL_GOOGLE_include_directive : require
+#include "group_rows.glsl"
 #include "triangle.glsl"
 #include "surfaces/triangles/record.glsl"
 #include "surfaces/triangles/groups.glsl"
@@ -217,8 +218,7 @@ void store_record(uint record, TriangleVertices t) {
 #endif
     vec3 of_w = vec3(1.0);
     if (frame.eye_ws.w == 0.0) {
-        of_w = vec3(dot(frame.distance_from_world, vec4(p[0], 1.0)), dot(frame.distance_from_world, vec4(p[1], 1.0)),
-                    dot(frame.distance_from_world, vec4(p[2], 1.0)));
+        of_w = vec3(distance_from_position(p[0]), distance_from_position(p[1]), distance_from_position(p[2]));
     }
     store(record, affine(basis, of_w));
     store_frame(record, basis, t);
@@ -236,7 +236,7 @@ void store_record(uint record, TriangleVertices t) {
 }
 
 void main() {
-    uint index = (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * GROUP_TRIANGLES + gl_LocalInvocationID.x;
+    uint index = group_number() * GROUP_TRIANGLES + gl_LocalInvocationID.x;
     if (index >= min(triangles_needed, TRIANGLE_CAPACITY)) {
         return;
     }

@@ -25,9 +25,6 @@ vec3 divided(vec3 over_w, vec3 inverse_w, float w) {
     return vec3(a, (over_w.yz - a * inverse_w.yz) * w);
 }
 
-// 1/w changes by this fraction within a pixel where the triangle's plane nearly ends in it, at its horizon.
-const float STEEP_CHANGE = 0.125;
-
 // Texture coordinates at another pixel of the record's plane.
 vec2 uv_at(uint word, vec2 from_anchor_px, vec3 inverse_w, vec2 step_px) {
     vec2 over_w = vec2(record_affine(word, from_anchor_px + step_px).x, record_affine(word + 3u, from_anchor_px + step_px).x);
@@ -51,7 +48,7 @@ TextureCoordinates analytic_uv(uint word, vec2 from_anchor_px, vec3 inverse_w, f
 }
 
 TextureCoordinates interpolated_uv(uint word, vec2 from_anchor_px, vec3 inverse_w, float w, vec2 to_corner_px) {
-    if (max(abs(inverse_w.y), abs(inverse_w.z)) > STEEP_CHANGE * abs(inverse_w.x)) {
+    if (is_steep(inverse_w.x, inverse_w.yz)) {
         return quad_uv(word, from_anchor_px, inverse_w, to_corner_px);
     }
     return analytic_uv(word, from_anchor_px, inverse_w, w);
@@ -102,12 +99,13 @@ void interpolate_frame(uint record, vec2 from_anchor_px, float w, inout SurfaceP
 
 // Normal and tangent where the record has changes of the normal alone (Schied and Dachsbacher 2015, section 4.3). `p` has position and
 // texture coordinates; the tangent follows the set that the material's normal map is seen through.
-void find_frame(uint record, vec2 from_anchor_px, vec2 pixel_center, float w, uint material, inout SurfacePoint p) {
+void find_frame(uint record, vec2 from_anchor_px, vec2 pixel_center, vec3 first_words, vec3 inverse_w, uint material,
+                inout SurfacePoint p) {
+    float w = 1.0 / inverse_w.x;
     p.normal_ws = vec3(record_affine(record + 3u, from_anchor_px).x, record_affine(record + 6u, from_anchor_px).x,
                        record_affine(record + 9u, from_anchor_px).x) * w;
     p.tangent_ws = vec4(0.0);
     if (NORMAL_BUCKETS > 0u) {
-        vec3 first_words = record_affine(record, from_anchor_px);
         // A step on the screen at one distance, then along the ray by the change of the distance. Not the difference to the position a pixel
         // on, which of a triangle seen at a flat angle may lie beyond the horizon of its plane.
         bool orthographic = frame.eye_ws.w == 0.0;
@@ -115,7 +113,6 @@ void find_frame(uint record, vec2 from_anchor_px, vec2 pixel_center, float w, ui
         vec3 dp_dx = interpolated_position(first_words, pixel_center + vec2(1.0, 0.0)) - p.position_ws + ray * first_words.y;
         vec3 dp_dy = interpolated_position(first_words, pixel_center + vec2(0.0, 1.0)) - p.position_ws + ray * first_words.z;
         bool second_set = HAS_UV1 != 0u && (load_material(material).normal_slot & (1u << 24)) != 0u;
-        vec3 inverse_w = orthographic ? vec3(1.0, 0.0, 0.0) : first_words;
         uint word = second_set ? record + UV1_WORD : record + 12u;
         TextureCoordinates at = analytic_uv(word, from_anchor_px, inverse_w, w);
         p.tangent_ws = tangent_from_changes(p.normal_ws, dp_dx, dp_dy, at);
@@ -171,7 +168,7 @@ SurfacePoint interpolated_point(uint index, vec2 pixel, out uint material) {
         }
     }
     if (TANGENTS == TANGENTS_BY_DERIVATIVES) {
-        find_frame(record, from_anchor, center, w, material, p);
+        find_frame(record, from_anchor, center, first_words, inverse_w, material, p);
     } else {
         interpolate_frame(record, from_anchor, w, p);
     }

@@ -21,8 +21,6 @@ use afterlight_frame::{
 const WORDS_A_DRAW: u64 = DRAW_TRIANGLES as u64 / 32;
 /// Draws whose bits a group counts: `BLOCK_WORDS` in `blocks.glsl`, in draws.
 const BLOCK_DRAWS: u32 = 32;
-/// Most groups in a row of a dispatch: every device takes 65,535.
-const ROW_GROUPS: u32 = 1 << 15;
 
 choices! {
     /// Where shading of normal maps has tangents from.
@@ -319,7 +317,7 @@ pub fn store_marked(
     pass.read("VisibleBits", &bits);
     let before = pass.write("VisibleBeforeOut", before);
     let of_block = pass.write("VisibleOfBlock", of_block);
-    pass.dispatch([blocks.min(ROW_GROUPS), blocks.div_ceil(ROW_GROUPS), 1]);
+    pass.dispatch(frame.groups_in_rows(blocks));
     pass.finish();
 
     let mut pass = frame.compute(
