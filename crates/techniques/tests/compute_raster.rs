@@ -17,12 +17,12 @@ use afterlight_techniques::{
         gpu::{self, vk},
     },
     params_of, registry,
-    scene::{Aabb, Camera, Instance, Material, Mesh, Projection, Scene, VertexAttributes, rng::SplitMix64},
+    scene::{Camera, Material, Projection, Scene, rng::SplitMix64},
     set_param,
     shader::Shader,
 };
-use common::{Stage, compiled_with_header, image_of, params, psnr};
-use glam::{Affine3A, DVec2, DVec3, DVec4, Vec3};
+use common::{Stage, compiled_variant, direction, flat, image_of, params, psnr};
+use glam::{DVec2, DVec3, DVec4, Vec3};
 
 /// Half of the spacing of floats at 1.
 const U: f64 = 1.0 / 16_777_216.0;
@@ -75,35 +75,9 @@ type Triangle = [Vec3; 3];
 /// At most 1,024 triangles in world space: one draw, so that a triangle's place in it is its own.
 fn scene_of(triangles: &[Triangle], camera: &Camera, double_sided: bool) -> Scene {
     assert!(triangles.len() <= 1024, "{} triangles are more than a draw holds", triangles.len());
-    let positions: Vec<Vec3> = triangles.iter().flatten().copied().collect();
-    let mut bounds = Aabb::EMPTY;
-    positions.iter().for_each(|p| bounds.extend(*p));
-    let attributes = VertexAttributes {
-        normal_os_oct: 0,
-        tangent_os_oct: 0,
-        uv0: [0; 2],
-        uv1: [0; 2],
-        color_rgba8: u32::MAX,
-    };
-    let count = positions.len() as u32;
-    Scene {
-        attributes: vec![attributes; positions.len()],
-        positions_os: positions.iter().map(|p| p.to_array()).collect(),
-        indices: (0..count).collect(),
-        meshes: vec![Mesh {
-            name: String::new(),
-            first_index: 0,
-            index_count: count,
-            first_vertex: 0,
-            vertex_count: count,
-            material: 0,
-            bounds_os: bounds,
-        }],
-        instances: vec![Instance { mesh: 0, node: 0, world_from_object: Affine3A::IDENTITY }],
-        materials: vec![Material { double_sided, ..Material::default() }],
-        cameras: vec![camera.clone()],
-        ..Scene::default()
-    }
+    let draw = triangles.iter().map(|triangle| (*triangle, [255; 3])).collect();
+    let scene = flat::scene_of(&[(Material { double_sided, ..Material::default() }, draw)], Vec3::Z);
+    Scene { cameras: vec![camera.clone()], ..scene }
 }
 
 /// A view of triangles.
@@ -198,7 +172,7 @@ impl Exact {
     fn new(view: &View, triangle: &Triangle) -> Self {
         let aspect = view.size_px.0 as f32 / view.size_px.1 as f32;
         // What the device is given.
-        let m = (view.camera.clip_from_view(aspect) * view.camera.view_from_world()).as_dmat4();
+        let m = view.camera.clip_from_world(aspect).as_dmat4();
         let clip = triangle.map(|p| m * p.as_dvec3().extend(1.0));
         let terms = triangle.map(|p| {
             let p = p.as_dvec3().abs();
@@ -299,7 +273,7 @@ fn judge(view: &View, triangles: &[Triangle], shown: &[Option<Shown>]) -> (Wrong
 /// The shaders of the stage with parts of a header replaced.
 fn mutants(header: &str, replaced: &[(&str, &str)]) -> Vec<Shader> {
     ["triangles.comp", "bin.comp", "large.comp"]
-        .map(|name| compiled_with_header(&format!("surfaces/compute_raster/{name}"), header, replaced))
+        .map(|name| compiled_variant(&format!("surfaces/compute_raster/{name}"), header, replaced))
         .to_vec()
 }
 
@@ -338,21 +312,8 @@ fn planes() -> Vec<Shader> {
     )
 }
 
-fn unit(rng: &mut SplitMix64) -> f32 {
-    rng.next_f32()
-}
-
 fn log_between(rng: &mut SplitMix64, low: f32, high: f32) -> f32 {
-    low * (high / low).powf(unit(rng))
-}
-
-fn direction(rng: &mut SplitMix64) -> Vec3 {
-    loop {
-        let v = Vec3::new(unit(rng), unit(rng), unit(rng)) * 2.0 - 1.0;
-        if (1e-3..1.0).contains(&v.length_squared()) {
-            return v.normalize();
-        }
-    }
+    low * (high / low).powf(rng.next_f32())
 }
 
 fn camera(eye: Vec3, towards: Vec3, fov_y_rad: f32, near_m: f32) -> Camera {
@@ -374,7 +335,8 @@ fn random_triangle(rng: &mut SplitMix64, camera: &Camera, aspect: f32, reach: f3
         panic!("found an orthographic camera, expected a perspective one")
     };
     let half = (0.5 * fov_y_rad).tan();
-    let ray = Vec3::new((2.0 * unit(rng) - 1.0) * half * aspect, (2.0 * unit(rng) - 1.0) * half, -1.0);
+    let ray =
+        Vec3::new((2.0 * rng.next_f32() - 1.0) * half * aspect, (2.0 * rng.next_f32() - 1.0) * half, -1.0);
     let distance_m = log_between(rng, 1.1 * near_m, 300.0);
     let size_m = distance_m * log_between(rng, 0.02, reach);
     let mut edges = [direction(rng), direction(rng)];
@@ -384,7 +346,7 @@ fn random_triangle(rng: &mut SplitMix64, camera: &Camera, aspect: f32, reach: f3
         _ => {}
     }
     let edges = edges.map(|e| e * size_m * log_between(rng, 0.1, 1.0));
-    let (b, c) = (unit(rng), unit(rng));
+    let (b, c) = (rng.next_f32(), rng.next_f32());
     let (b, c) = if b + c > 1.0 { (1.0 - b, 1.0 - c) } else { (b, c) };
     let corner = ray * distance_m - edges[0] * b - edges[1] * c;
     [corner, corner + edges[0], corner + edges[1]].map(|p| world_from_view.transform_point3(p))
@@ -392,8 +354,8 @@ fn random_triangle(rng: &mut SplitMix64, camera: &Camera, aspect: f32, reach: f3
 
 /// Views whose near plane is from a fifth of a millimetre to half a metre away.
 fn random_camera(rng: &mut SplitMix64) -> Camera {
-    let eye = direction(rng) * 10.0 * unit(rng);
-    let fov = 0.1 + 2.4 * unit(rng);
+    let eye = direction(rng) * 10.0 * rng.next_f32();
+    let fov = 0.1 + 2.4 * rng.next_f32();
     camera(eye, direction(rng), fov, log_between(rng, 2e-4, 0.5))
 }
 
@@ -439,12 +401,12 @@ impl Snapped {
         let reach = log_between(rng, 4.0, 4000.0);
         let mut point = || {
             [size_px.0, size_px.1]
-                .map(|size| (256.0 * (0.5 * size as f32 + reach * (2.0 * unit(rng) - 1.0))) as i64)
+                .map(|size| (256.0 * (0.5 * size as f32 + reach * (2.0 * rng.next_f32() - 1.0))) as i64)
         };
         let mut at = [point(), point(), point()];
         if rng.next_u64().is_multiple_of(2) {
             // A sliver, up to some hundredths of a pixel high.
-            let t = f64::from(unit(rng));
+            let t = f64::from(rng.next_f32());
             let [a, b, _] = at;
             at[2] = [0, 1].map(|k| {
                 let along = a[k] as f64 + t * (b[k] - a[k]) as f64;
@@ -558,16 +520,16 @@ fn triangles_of_a_fan_share_no_sample_and_leave_none_out() {
         let mut rng = SplitMix64::new(100 + seed);
         let samples = if seed.is_multiple_of(2) { 1 } else { 4 };
         // Seen from above, so that the fan's front shows.
-        let down = Vec3::new(unit(&mut rng) - 0.5, -0.2 - unit(&mut rng), unit(&mut rng) - 0.5);
+        let down = Vec3::new(rng.next_f32() - 0.5, -0.2 - rng.next_f32(), rng.next_f32() - 0.5);
         let near_m = log_between(&mut rng, 1e-4, 0.2);
         let mut view = View::new(camera(Vec3::Y * 1.7, down, 1.2, near_m), (65, 49), samples);
         view.double_sided = false;
-        let middle = Vec3::new(unit(&mut rng) * 2.0 - 1.0, 0.0, unit(&mut rng) * 2.0 - 1.0);
+        let middle = Vec3::new(rng.next_f32() * 2.0 - 1.0, 0.0, rng.next_f32() * 2.0 - 1.0);
         let far = log_between(&mut rng, 10.0, 1e5);
         let outer: Vec<Vec3> = (0..COUNT)
             .map(|i| {
-                let angle = (i as f32 + 0.8 * unit(&mut rng)) * std::f32::consts::TAU / COUNT as f32;
-                middle + Vec3::new(angle.sin(), 0.0, angle.cos()) * far * (0.5 + unit(&mut rng))
+                let angle = (i as f32 + 0.8 * rng.next_f32()) * std::f32::consts::TAU / COUNT as f32;
+                middle + Vec3::new(angle.sin(), 0.0, angle.cos()) * far * (0.5 + rng.next_f32())
             })
             .collect();
         let fan: Vec<Triangle> = (0..COUNT).map(|i| [middle, outer[i], outer[(i + 1) % COUNT]]).collect();
@@ -576,10 +538,10 @@ fn triangles_of_a_fan_share_no_sample_and_leave_none_out() {
         for triangle in &fan {
             let alone = view.on_device(&gpu, &[*triangle], &[]);
             alone.iter().zip(&mut times).for_each(|(shown, times)| *times += usize::from(shown.is_some()));
-            let [a, b, c] = *triangle;
-            let turned = view.on_device(&gpu, &[[a, c, b]], &[]);
-            assert_eq!(turned.iter().flatten().count(), 0, "seed {seed}: a back face shows");
         }
+        let turned: Vec<Triangle> = fan.iter().map(|[a, b, c]| [*a, *c, *b]).collect();
+        let back_faces = view.on_device(&gpu, &turned, &[]);
+        assert_eq!(back_faces.iter().flatten().count(), 0, "seed {seed}: a back face shows");
         let more = times.iter().filter(|times| **times > 1).count();
         assert_eq!(more, 0, "seed {seed}: samples of two triangles");
         let (wrong, covered) = judge(&view, &fan, &all);

@@ -9,7 +9,7 @@ use afterlight_techniques::{
     scene::{Light, LightKind},
     shader::Shader,
 };
-use common::{Stage, compiled_with_header, image_of, params, psnr};
+use common::{Stage, compiled_variant, image_of, params, psnr};
 use glam::{DVec3, Vec3};
 
 /// The techniques with the shader that visits the lights.
@@ -28,7 +28,7 @@ fn rendered(stage: &Stage, id: &str, settings: &Settings, shader: Option<Shader>
 
 /// A shader that visits the lights, with parts of `lights/indices/indices.glsl` replaced.
 fn visits(shader: &str, replaced: &[(&str, &str)]) -> Shader {
-    compiled_with_header(shader, "lights/indices/indices.glsl", replaced)
+    compiled_variant(shader, "lights/indices/indices.glsl", replaced)
 }
 
 /// Places that the pixels show.

@@ -9,7 +9,7 @@ use afterlight_techniques::{
     scene::{Camera, Light, LightKind},
     shader::Shader,
 };
-use common::{Stage, compiled, image_of, params, psnr, source};
+use common::{Stage, compiled_variant, image_of, params, psnr};
 use glam::Vec3;
 
 const TECHNIQUES: [&str; 2] = ["light-list", "light-list-forward"];
@@ -30,10 +30,9 @@ fn rendered(
     (image, prepared.counters().unwrap_or_else(|e| panic!("{e}")))
 }
 
-/// `append.frag` with a part of its text replaced.
-fn mutant(from: &str, to: &str) -> Shader {
-    let path = source("lights/pixel_lists/append.frag.glsl");
-    compiled("lights/pixel_lists/append.frag#one", &path, &["ONE_DEPTH"], &[(from, to)])
+/// `append.frag` with parts of its text replaced.
+fn mutant(replaced: &[(&str, &str)]) -> Shader {
+    compiled_variant("lights/pixel_lists/append.frag#one", "lights/pixel_lists/append.frag.glsl", replaced)
 }
 
 /// Both techniques against `forward`; nothing is dropped.
@@ -95,11 +94,11 @@ fn lists_hold_what_is_within_range() {
         assert!(off(counters[0].needed) < 0.002, "{id}: {} nodes, {expected} by rays", counters[0].needed);
 
         // Lights whose volume lies behind the surface.
-        let loose = mutant("float reach_m = sphere.w + slack_m;", "float reach_m = 1e9;");
+        let loose = mutant(&[("float reach_m = sphere.w + slack_m;", "float reach_m = 1e9;")]);
         let (_, more) = rendered(&stage, technique, &settings, &[], Some(&loose));
         assert!(off(more[0].needed) > 0.02, "{id}: a mutant within the bound: {} nodes", more[0].needed);
 
-        let dropped = mutant("!gl_HelperInvocation &&", "light_index != frame.light_count - 1u &&");
+        let dropped = mutant(&[("!gl_HelperInvocation &&", "light_index != frame.light_count - 1u &&")]);
         let (fewer_lit, fewer) = rendered(&stage, technique, &settings, &[], Some(&dropped));
         let db = psnr(&image, &fewer_lit);
         assert!(off(fewer[0].needed) > 0.002 && db < MIN_PSNR_DB, "{id}: a dropped light: {db:.2} dB");
@@ -150,18 +149,16 @@ fn counters_of_nodes_are_held_below_2_to_the_32() {
     let gpu = afterlight_testkit::gpu();
     let stage = Stage::new(&gpu, "builtin:colonnade?triangles=30000");
     let settings = stage.settings((160, 90), 100);
+    let low = ("MOST_NEEDED = 0xf0000000u", "MOST_NEEDED = 100u");
+    let (held, kept) = (mutant(&[low]), mutant(&[low, ("0xffffffffu", "0u")]));
     for id in TECHNIQUES {
         let technique = find(id).unwrap();
         let sets = [("light-nodes", "16")];
         let needed = rendered(&stage, technique, &settings, &sets, None).1[0].needed;
         assert!(needed > 1000, "{id}: the view has {needed} pairs");
-        let held = mutant("MOST_NEEDED = 0xf0000000u", "MOST_NEEDED = 100u");
         let counter = rendered(&stage, technique, &settings, &sets, Some(&held)).1.remove(0);
         assert_eq!((counter.needed, counter.dropped), (100, 100), "{id}: of {needed}");
         // The mutant: nobody takes back.
-        let path = source("lights/pixel_lists/append.frag.glsl");
-        let replaced = [("MOST_NEEDED = 0xf0000000u", "MOST_NEEDED = 100u"), ("0xffffffffu", "0u")];
-        let kept = compiled("lights/pixel_lists/append.frag#one", &path, &["ONE_DEPTH"], &replaced);
         let counter = rendered(&stage, technique, &settings, &sets, Some(&kept)).1.remove(0);
         assert_eq!(counter.needed, needed, "{id}: a counter that runs on goes unseen: {counter:?}");
     }

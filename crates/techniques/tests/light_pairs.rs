@@ -13,7 +13,7 @@ use afterlight_techniques::{
     shader::Shader,
     views,
 };
-use common::{Stage, compiled_with_header, image_of, radiance_of, wider};
+use common::{Stage, compiled_variant, image_of, radiance_of, wider};
 use glam::{DVec3, Vec3};
 
 /// By how much the lit pairs of two exact techniques differ at one sample: surfaces stand where depth or attributes say, so that
@@ -89,7 +89,7 @@ fn off(found: &[[f64; 2]], seen: &[Option<Seen>]) -> (usize, usize) {
 
 /// `forward/forward.frag` with a part of a header of all shaders replaced.
 fn mutant(header: &str, from: &str, to: &str) -> Shader {
-    compiled_with_header("surfaces/depth_first/forward.frag", header, &[(from, to)])
+    compiled_variant("surfaces/depth_first/forward.frag", header, &[(from, to)])
 }
 
 #[test]

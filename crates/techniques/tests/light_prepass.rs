@@ -10,8 +10,8 @@ use afterlight_techniques::{
     shader::Shader,
 };
 use common::{
-    Random, Stage, compiled, compiled_with_header, image_of, least_db, lights_of_each_kind, params, psnr,
-    radiance_of, random_camera, source,
+    Stage, compiled, compiled_variant, image_of, least_db, lights_of_each_kind, params, psnr, radiance_of,
+    random_views, source,
 };
 use glam::Vec3;
 
@@ -102,7 +102,7 @@ fn sums_beyond_their_format_stay_numbers() {
         radiance.iter().flatten().filter(|c| c.is_nan()).count()
     };
     assert_eq!(not_numbers(None), 0);
-    let unbounded = compiled_with_header(
+    let unbounded = compiled_variant(
         "light_prepass/material.frag",
         "light_prepass/sums.glsl",
         &[(
@@ -133,12 +133,7 @@ fn multisampled(
 
 /// `light_prepass/material.frag#alike` with a part of `alike.glsl` replaced.
 fn alike_mutant(from: &str, to: &str) -> Shader {
-    let path = source("light_prepass/material.frag.glsl");
-    let header = std::fs::read_to_string(source("light_prepass/alike.glsl")).expect("a shader");
-    assert!(header.contains(from), "alike.glsl has changed: found no {from:?}");
-    let header = header.replace(from, to);
-    let whole = [("#include \"light_prepass/alike.glsl\"", header.as_str())];
-    compiled("light_prepass/material.frag#alike", &path, &["ALIKE_PIXELS"], &whole)
+    compiled_variant("light_prepass/material.frag#alike", "light_prepass/alike.glsl", &[(from, to)])
 }
 
 /// Pixels that one fragment covers: `deferred-msaa` shades them once, and no background shows in them.
@@ -226,22 +221,17 @@ fn what_makes_surfaces_alike_is_needed() {
 /// Views that nobody chose.
 #[test]
 fn random_views_stay_within_what_is_promised() {
-    let gpu = afterlight_testkit::gpu();
     let technique = find("light-prepass").unwrap();
-    let mut random = Random(45);
-    for scene in ["builtin:spheres", "builtin:colonnade?triangles=17000&texture=64", "builtin:intersect"] {
-        let stage = Stage::new(&gpu, scene);
-        for view in 0..8 {
-            let camera = random_camera(&stage, &mut random);
-            let lights = [2, 10, 60, 300][(random.unit() * 4.0) as usize];
-            let settings = Settings { samples: 4, ..stage.from(camera, (97, 53), lights) };
-            let reference = stage.image(find("forward").unwrap(), &settings);
-            for set in [[("edge-light", "alike")], [("edge-light", "pixel")]] {
-                let db = psnr(&reference, &multisampled(&stage, &settings, &set, Vec::new()));
-                println!("{scene} view {view}, {lights} lights: {set:?}: {db:.2} dB");
-                let least = least_db(technique, &params(technique, &set), 4);
-                assert!(db >= least, "{scene} view {view}: {set:?}: {db:.2} dB, {least} promised");
-            }
+    random_views(45, |stage, settings, reference, what| {
+        for set in [[("edge-light", "alike")], [("edge-light", "pixel")]] {
+            let db = psnr(reference, &multisampled(stage, settings, &set, Vec::new()));
+            println!("{what}: {set:?}: {db:.2} dB");
+            let least = least_db(technique, &params(technique, &set), 4);
+            assert!(db >= least, "{what}: {set:?}: {db:.2} dB, {least} promised");
+            // These views measure 29.4 and 25.0 at worst; what is promised holds from others as well.
+            let (_, edge_light) = set[0];
+            let floor = if edge_light == "alike" { 28.0 } else { 24.0 };
+            assert!(db >= floor, "{what}: {set:?}: {db:.2} dB, {floor} measured before");
         }
-    }
+    });
 }

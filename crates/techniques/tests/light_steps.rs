@@ -7,7 +7,7 @@ use afterlight_techniques::{
     scene::{Light, LightKind},
     shader::Shader,
 };
-use common::{Stage, compiled_with_header, image_of, params, psnr};
+use common::{Stage, compiled_variant, image_of, params, psnr};
 use glam::Vec3;
 
 /// Lights of all kinds, more than a node of the tree holds.
@@ -91,7 +91,7 @@ fn wrong_lists_are_seen() {
     let settings = settings(&stage, 1);
     let technique = find("deferred").unwrap();
     let mutant = |header, from, to| -> Shader {
-        compiled_with_header("surfaces/gbuffer/shade.comp", header, &[(from, to)])
+        compiled_variant("surfaces/gbuffer/shade.comp", header, &[(from, to)])
     };
     let image = |lights, shaders: Vec<Shader>| {
         let params = params(technique, &[("lights", lights)]);

@@ -42,7 +42,7 @@ fn parameters_end_where_shaders_have_no_room() {
     }
 }
 
-/// A keys' buffer of the compute rasteriser, or a G-buffer list, that one binding cannot reach is refused with its bytes.
+/// A keys' buffer of the compute rasteriser that one binding cannot reach is refused with its bytes.
 #[test]
 fn what_one_binding_cannot_reach_is_refused_with_its_bytes() {
     let gpu = afterlight_testkit::gpu();

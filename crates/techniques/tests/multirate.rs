@@ -2,15 +2,8 @@
 
 mod common;
 
-use std::path::Path;
-
-use afterlight_renderer::Renderer;
-use afterlight_techniques::{
-    Indirect, Params, Settings, find,
-    graph::{BufferRole, PassRole, gpu},
-    shader::Shader,
-};
-use common::{Stage, compiled, params, radiance_of, variant_with_header};
+use afterlight_techniques::{Indirect, Settings, find, graph::gpu, shader::Shader};
+use common::{Stage, compiled_variant, found_by, params, radiance_of, subgroup_sizes};
 
 fn counts(device: &gpu::Device) -> Vec<u32> {
     afterlight_testkit::sample_counts(device, &[1, 4, 8])
@@ -124,15 +117,8 @@ fn low_rates_against_full_rate() {
 fn quads_in_subgroups(stage: &Stage, settings: &Settings, shaders: &[Shader], size: Option<u32>) -> Radiance {
     let technique = find("dais-multirate").unwrap();
     let params = params(technique, &[("visibility", "raster"), ("share", "quads")]);
-    let renderer = Renderer::with_scene(&stage.device, stage.uploaded.clone(), settings);
-    let mut renderer = renderer.unwrap_or_else(|e| panic!("{e}"));
-    renderer.add_shaders(shaders.iter().cloned());
-    let prepared = renderer.prepare_with(technique, &params, |graph, _| {
-        if let Some(size) = size {
-            assert!(graph.set_subgroup_size("dais-multirate/shade", size), "no such pass");
-        }
-    });
-    radiance_of(&mut prepared.unwrap_or_else(|e| panic!("{e}")))
+    let pass = ("dais-multirate/shade", size);
+    radiance_of(&mut stage.prepare_in_subgroups((technique, &params), settings, shaders, pass))
 }
 
 /// Quads share the same samples whatever the size of subgroups. The mutants: the number that a thread was taken for, on a driver that
@@ -146,13 +132,13 @@ fn quads_do_not_depend_on_the_size_of_subgroups() {
         effects.indirect.method = Indirect::Rsm;
     });
     let expected = quads_in_subgroups(&stage, &settings, &[], None);
-    let sizes = gpu.features().subgroup_sizes();
+    let sizes = subgroup_sizes(&gpu);
     for size in &sizes {
         let found = quads_in_subgroups(&stage, &settings, &[], Some(*size));
         assert!(found == expected, "subgroups of {size}: another image");
     }
     let mutant = |from: &str, to: &str| {
-        variant_with_header("dais/shade.comp#one-quads", "surfaces/low_rate/low_rate.glsl", &[(from, to)])
+        compiled_variant("dais/shade.comp#one-quads", "surfaces/low_rate/low_rate.glsl", &[(from, to)])
     };
     let smallest = sizes.first().copied();
     if smallest.unwrap_or(gpu.features().subgroup_size) < 32 {
@@ -166,10 +152,6 @@ fn quads_do_not_depend_on_the_size_of_subgroups() {
     let alone = mutant("bool in_order =", "bool in_order = false &&");
     let found = quads_in_subgroups(&stage, &settings, &[alone], None);
     assert!(found != expected, "quads that are never found go unseen");
-    if sizes.len() < 2 {
-        let one = format!("{} offers one size, {}", gpu.info().name, gpu.features().subgroup_size);
-        afterlight_testkit::skip(afterlight_testkit::Need::SubgroupSizes, &one);
-    }
 }
 
 /// Without indirect light there is nothing to share: the image of `dais`.
@@ -212,33 +194,7 @@ fn chroma([x, y, z]: [f64; 3]) -> [f64; 2] {
 
 /// Greatest errors of 32,768 colours after LogLuv, in halves of its steps: luminance, chroma.
 fn logluv_errors(stage: &Stage, decode: &[(&str, &str)]) -> [f64; 2] {
-    let tests = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests");
-    let include = tests.join("../../shader/include/logluv.glsl");
-    let mut header = std::fs::read_to_string(include).expect("a shader");
-    for (from, to) in decode {
-        assert!(header.contains(from), "logluv.glsl has changed: found no {from:?}");
-        header = header.replace(from, to);
-    }
-    let whole = [("#include \"logluv.glsl\"", header.as_str())];
-    let shader = compiled("test/logluv.comp", &tests.join("logluv.comp.glsl"), &[], &whole);
-    let renderer = Renderer::with_scene(&stage.device, stage.uploaded.clone(), &stage.settings((8, 8), 1));
-    let prepared = renderer.unwrap_or_else(|e| panic!("{e}")).prepare_with(
-        find("forward").unwrap(),
-        &Params::default(),
-        |graph, _| {
-            let found = graph.buffer("test/found", BufferRole::Counters, 32 << 15);
-            let mut pass = graph.compute("test/logluv", PassRole::Upkeep, &shader);
-            let found = pass.write("Found", found);
-            pass.dispatch([512, 1, 1]);
-            pass.finish();
-            graph.keep(&found);
-        },
-    );
-    let mut prepared = prepared.unwrap_or_else(|e| panic!("{e}"));
-    prepared.run().unwrap_or_else(|e| panic!("{e}"));
-    let bytes = prepared.executor().read_buffer("test/found").unwrap_or_else(|e| panic!("{e}"));
-    let floats: Vec<f64> =
-        bytes.chunks_exact(4).map(|b| f64::from(f32::from_le_bytes([b[0], b[1], b[2], b[3]]))).collect();
+    let floats = found_by(stage, "logluv.comp", ("logluv.glsl", decode), (8 << 15, 512));
     let mut errors = [0.0f64; 2];
     for pair in floats.chunks_exact(8) {
         let [before, after] = [&pair[..3], &pair[4..7]].map(|c| xyz([c[0], c[1], c[2]]));

@@ -14,7 +14,7 @@ use common::{
     Stage, compiled_variant, covered,
     flat::{scene_of, unlit},
     image_of, least_db, params, psnr, radiance_of,
-    ways::every_way,
+    ways::{every_way, ways_of_surfaces},
 };
 use glam::Vec3;
 
@@ -29,19 +29,12 @@ fn counts(device: &gpu::Device) -> Vec<u32> {
 /// Ways in which a technique works, by its parameters, besides its lights.
 fn ways(id: &str) -> &'static [&'static [(&'static str, &'static str)]] {
     match id {
-        "gbuffer-list" => &[&[("visibility", "raster")], &[("fill", "raster")], &[("visibility", "compute")]],
-        "dais" => &[
-            &[("visibility", "raster")],
-            &[("visibility", "compute")],
-            &[("fill", "cache")],
-            &[("fill", "cache"), ("cache-buckets", "1")],
-            &[("fill", "cache"), ("reference-bits", "8")],
-        ],
-        "dais-list" => &[&[], &[("bands", "1")], &[("bands", "3")]],
         "deferred-ssaa" => &[&[], &[("position", "sample")]],
         "deferred-msaa" => &[&[], &[("position", "sample")], &[("edges", "centroid")]],
         "light-prepass" => &[&[], &[("edge-light", "pixel")]],
-        _ => &[&[]],
+        // As `dais`, whose image it gives without indirect light.
+        "dais-multirate" => &[&[]],
+        _ => ways_of_surfaces(id),
     }
 }
 
@@ -547,7 +540,7 @@ fn triangles_without_room_are_told_and_no_other_shows() {
         atomicMax(triangles_needed, TRIANGLE_CAPACITY + 8u);
     }",
     );
-    let tessellated = gpu.features().tessellation_shader && gpu.features().geometry_shader;
+    let tessellated = afterlight_testkit::has_tessellation(&gpu);
     for (id, sets, shader, samples, tessellate) in [
         ("dais", &[("fill", "cache")][..], "dais/fill.frag", 1, false),
         ("dais", &[("fill", "cache"), ("reference-bits", "8")], "dais/fill.frag#wide", 1, false),
@@ -557,7 +550,6 @@ fn triangles_without_room_are_told_and_no_other_shows() {
         ("dais-list", &[], "dais_list/fill.frag#whole", 4, true),
     ] {
         if tessellate && !tessellated {
-            println!("skipped: {id} {sets:?} with tessellation, which the device lacks");
             continue;
         }
         let mut settings = Settings { samples, ..stage.settings((161, 91), 0) };

@@ -2,49 +2,18 @@
 
 mod common;
 
-use std::path::Path;
-
-use afterlight_renderer::Renderer;
-use afterlight_techniques::{
-    Params, Settings, find,
-    graph::{BufferRole, PassRole},
-};
-use common::{Random, Stage, compiled, image_of, least_db, params, psnr, random_camera, source};
+use afterlight_techniques::{Settings, find};
+use common::{Stage, compiled_variant, found_by, image_of, least_db, params, psnr, random_views};
 
 /// Greatest error of 65,536 depths at the centre: over 1/256 of what depth changes within the pixel and 2^-24 of the depth, which is
 /// promised. Parts of the header's text are replaced.
 fn worst_error(stage: &Stage, replaced: &[(&str, &str)]) -> f64 {
-    let mut header = std::fs::read_to_string(source("surfaces/samples/center_depth.glsl")).expect("a shader");
-    for (from, to) in replaced {
-        assert!(header.contains(from), "center_depth.glsl has changed: found no {from:?}");
-        header = header.replace(from, to);
-    }
-    let tests = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests");
-    let whole = [("#include \"surfaces/samples/center_depth.glsl\"", header.as_str())];
-    let shader = compiled("test/center_depth.comp", &tests.join("center_depth.comp.glsl"), &[], &whole);
-    let renderer = Renderer::with_scene(&stage.device, stage.uploaded.clone(), &stage.settings((8, 8), 1));
-    let prepared = renderer.unwrap_or_else(|e| panic!("{e}")).prepare_with(
-        find("forward").unwrap(),
-        &Params::default(),
-        |graph, _| {
-            let found = graph.buffer("test/found", BufferRole::Counters, 16 << 16);
-            let mut pass = graph.compute("test/center depth", PassRole::Upkeep, &shader);
-            let found = pass.write("Found", found);
-            pass.dispatch([1024, 1, 1]);
-            pass.finish();
-            graph.keep(&found);
-        },
-    );
-    let mut prepared = prepared.unwrap_or_else(|e| panic!("{e}"));
-    prepared.run().unwrap_or_else(|e| panic!("{e}"));
-    let bytes = prepared.executor().read_buffer("test/found").unwrap_or_else(|e| panic!("{e}"));
-    let floats: Vec<f64> =
-        bytes.chunks_exact(4).map(|b| f64::from(f32::from_le_bytes([b[0], b[1], b[2], b[3]]))).collect();
+    let header = ("surfaces/samples/center_depth.glsl", replaced);
+    let floats = found_by(stage, "center_depth.comp", header, (4 << 16, 1024));
     let error = |found: &[f64]| {
         let [center, change, sample, read] = [found[0], found[1], found[2], found[3]];
         (read - center).abs() / (change / 256.0 + 2f64.powi(-24) * (center.abs() + sample))
     };
-    assert_eq!(floats.len(), 4 << 16);
     floats.chunks_exact(4).map(error).fold(0.0, f64::max)
 }
 
@@ -74,35 +43,22 @@ fn depth_at_the_centre_is_off_by_a_256th_of_its_change() {
 /// Views that nobody chose: small, so that light changes within pixels. Where samples are lit at their own places, some of them fail.
 #[test]
 fn random_views_agree_with_forward() {
-    let gpu = afterlight_testkit::gpu();
-    if !gpu.features().supports_samples(4, false) {
-        panic!("every device has 4 samples");
-    }
-    let mut random = Random(12);
     let mut worst_at_samples = f64::INFINITY;
-    for scene in ["builtin:spheres", "builtin:colonnade?triangles=17000&texture=64", "builtin:intersect"] {
-        let stage = Stage::new(&gpu, scene);
-        for view in 0..8 {
-            let camera = random_camera(&stage, &mut random);
-            let lights = [2, 10, 60, 300][(random.unit() * 4.0) as usize];
-            let settings = Settings { samples: 4, ..stage.from(camera, (97, 53), lights) };
-            let reference = stage.image(find("forward").unwrap(), &settings);
-            for id in ["deferred-ssaa", "deferred-msaa"] {
-                let technique = find(id).unwrap();
-                for set in [&[][..], &[("lights", "all")], &[("position", "sample")]] {
-                    let params = params(technique, set);
-                    let db =
-                        psnr(&reference, &image_of(&mut stage.prepare_with(technique, &settings, &params)));
-                    println!("{scene} view {view}, {lights} lights: {id} {set:?}: {db:.2} dB");
-                    let least = least_db(technique, &params, 4);
-                    assert!(db >= least, "{scene} view {view}: {id} {set:?}: {db:.2} dB, {least} promised");
-                    if set.first().is_some_and(|(key, _)| *key == "position") {
-                        worst_at_samples = worst_at_samples.min(db);
-                    }
+    random_views(12, |stage, settings, reference, what| {
+        for id in ["deferred-ssaa", "deferred-msaa"] {
+            let technique = find(id).unwrap();
+            for set in [&[][..], &[("lights", "all")], &[("position", "sample")]] {
+                let params = params(technique, set);
+                let db = psnr(reference, &image_of(&mut stage.prepare_with(technique, settings, &params)));
+                println!("{what}: {id} {set:?}: {db:.2} dB");
+                let least = least_db(technique, &params, 4);
+                assert!(db >= least, "{what}: {id} {set:?}: {db:.2} dB, {least} promised");
+                if set.first().is_some_and(|(key, _)| *key == "position") {
+                    worst_at_samples = worst_at_samples.min(db);
                 }
             }
         }
-    }
+    });
     println!("lit at samples: {worst_at_samples:.2} dB at worst");
     assert!(worst_at_samples < 38.0, "light at samples stays within the bound of light at centres");
 }
@@ -113,20 +69,17 @@ fn random_views_agree_with_forward() {
 fn edges_are_found_without_centroids() {
     let gpu = afterlight_testkit::gpu();
     let technique = find("deferred-msaa").unwrap();
+    let shader = "surfaces/samples/samples.frag";
+    let replaced = [("edge ? word | SAMPLE_EDGE : word", "word")];
+    let unmarked = compiled_variant(shader, &format!("{shader}.glsl"), &replaced);
     for scene in ["builtin:spheres", "builtin:intersect"] {
         let stage = Stage::new(&gpu, scene);
+        let settings = Settings { samples: 4, ..stage.settings((161, 91), 20) };
+        let reference = stage.image(find("forward").unwrap(), &settings);
         for lights in ["all", "clusters"] {
-            let settings = Settings { samples: 4, ..stage.settings((161, 91), 20) };
-            let reference = stage.image(find("forward").unwrap(), &settings);
             let db = |edges: &str| {
                 let params = params(technique, &[("lights", lights), ("edges", edges)]);
-                let unmarked = compiled(
-                    "surfaces/samples/samples.frag",
-                    &source("surfaces/samples/samples.frag.glsl"),
-                    &[],
-                    &[("edge ? word | SAMPLE_EDGE : word", "word")],
-                );
-                let mut prepared = stage.prepare_shaders(technique, &settings, &params, [unmarked]);
+                let mut prepared = stage.prepare_shaders(technique, &settings, &params, [unmarked.clone()]);
                 psnr(&reference, &image_of(&mut prepared))
             };
             let (fragments, centroid) = (db("fragments"), db("centroid"));

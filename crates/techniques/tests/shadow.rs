@@ -14,7 +14,7 @@ use afterlight_techniques::{
     scene::{Light, LightKind},
     shader::Shader,
 };
-use common::{Stage, compiled_with_header, image_of, least_db, lights_of_each_kind, psnr, radiance_of};
+use common::{Stage, compiled_variant, image_of, least_db, lights_of_each_kind, psnr, radiance_of};
 use glam::Vec3;
 
 /// Writes an image for the eye where `AFTERLIGHT_SHADOW_IMAGES` names a folder.
@@ -103,7 +103,7 @@ fn shares(probes: &[Probe], with: &[[f32; 4]], plain: &[[f32; 4]], none: &[[f32;
 
 /// `forward/forward.frag` with a part of `shadow.glsl` replaced.
 fn mutant(from: &str, to: &str) -> Shader {
-    compiled_with_header("surfaces/depth_first/forward.frag", "shadow.glsl", &[(from, to)])
+    compiled_variant("surfaces/depth_first/forward.frag", "shadow.glsl", &[(from, to)])
 }
 
 fn radiance(stage: &Stage, settings: &Settings, shader: Option<&Shader>) -> Vec<[f32; 4]> {

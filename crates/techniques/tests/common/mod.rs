@@ -10,11 +10,12 @@ use std::{
 
 use afterlight_image::{Rgba8Image, psnr_db};
 use afterlight_renderer::{Prepared, Renderer};
+use afterlight_stages::lights::indices;
 use afterlight_techniques::{
-    Exactness, Params, SceneGpu, Settings, Technique, TechniqueError, exactness_of,
-    graph::gpu,
+    Exactness, Params, SceneGpu, Settings, Technique, TechniqueError, exactness_of, find,
+    graph::{BufferRole, PassRole, gpu},
     params_of,
-    scene::{self, Camera, Light, LightKind, Scene, lights::seeded_lights},
+    scene::{self, Camera, Light, LightKind, Scene, lights::seeded_lights, rng::SplitMix64},
     set_param,
     shader::{Shader, compile::Compiler, manifest},
 };
@@ -87,11 +88,40 @@ impl Stage {
         params: &Params,
         shaders: impl IntoIterator<Item = Shader>,
     ) -> Prepared {
+        let prepared = self.try_prepare_shaders(technique, settings, params, shaders);
+        prepared.unwrap_or_else(|e| panic!("{}: {e}", technique.info().id))
+    }
+
+    /// The same, or why not.
+    pub fn try_prepare_shaders(
+        &self,
+        technique: &dyn Technique,
+        settings: &Settings,
+        params: &Params,
+        shaders: impl IntoIterator<Item = Shader>,
+    ) -> Result<Prepared, TechniqueError> {
+        let mut renderer = Renderer::with_scene(&self.device, self.uploaded.clone(), settings)?;
+        renderer.add_shaders(shaders);
+        renderer.prepare(technique, params)
+    }
+
+    /// The same, where a pass runs in subgroups of a size, or the device's own choice.
+    pub fn prepare_in_subgroups(
+        &self,
+        (technique, params): (&dyn Technique, &Params),
+        settings: &Settings,
+        shaders: &[Shader],
+        (pass, size): (&str, Option<u32>),
+    ) -> Prepared {
         let renderer = Renderer::with_scene(&self.device, self.uploaded.clone(), settings);
         let mut renderer = renderer.unwrap_or_else(|e| panic!("{e}"));
-        renderer.add_shaders(shaders);
-        let prepared = renderer.prepare(technique, params);
-        prepared.unwrap_or_else(|e| panic!("{}: {e}", technique.info().id))
+        renderer.add_shaders(shaders.iter().cloned());
+        let prepared = renderer.prepare_with(technique, params, |graph, _| {
+            if let Some(size) = size {
+                assert!(graph.set_subgroup_size(pass, size), "no such pass: {pass}");
+            }
+        });
+        prepared.unwrap_or_else(|e| panic!("{e}"))
     }
 
     /// A technique's image.
@@ -104,6 +134,17 @@ impl Stage {
     pub fn radiance(&self, technique: &dyn Technique, settings: &Settings) -> Vec<[f32; 4]> {
         radiance_of(&mut self.prepare(technique, &Settings { keep_hdr: true, ..settings.clone() }))
     }
+}
+
+/// Sizes of subgroups that shaders may require; that a device offers one alone is told.
+#[track_caller]
+pub fn subgroup_sizes(device: &gpu::Device) -> Vec<u32> {
+    let sizes = device.features().subgroup_sizes();
+    if sizes.len() < 2 {
+        let one = format!("{} offers one size, {}", device.info().name, device.features().subgroup_size);
+        afterlight_testkit::skip(afterlight_testkit::Need::SubgroupSizes, &one);
+    }
+    sizes
 }
 
 /// A technique's parameters from `key=value` words.
@@ -158,35 +199,58 @@ pub fn least_db(technique: &dyn Technique, params: &Params, samples: u32) -> f64
     }
 }
 
-/// Numbers from 0 to 1 (Steele, Lea and Flood 2014, SplitMix64).
-pub struct Random(pub u64);
-
-impl Random {
-    /// From 0 to 1.
-    pub fn unit(&mut self) -> f32 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut bits = self.0;
-        bits = (bits ^ bits >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        bits = (bits ^ bits >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((bits ^ bits >> 31) >> 40) as f32 / (1u64 << 24) as f32
+/// The same of pictures whose surfaces take four lights with an end at most: there techniques that keep four are exact.
+pub fn least_db_of_four_lights(technique: &dyn Technique, params: &Params, samples: u32) -> f64 {
+    match exactness_of(technique, params, samples) {
+        of if of == indices::EXACTNESS && samples == 1 => 50.0,
+        of if of == indices::EXACTNESS => MULTISAMPLED_MIN_DB,
+        _ => least_db(technique, params, samples),
     }
+}
 
-    /// Three of them.
-    pub fn vector(&mut self) -> Vec3 {
-        Vec3::new(self.unit(), self.unit(), self.unit())
+/// A unit vector, uniform over the sphere.
+pub fn direction(random: &mut SplitMix64) -> Vec3 {
+    loop {
+        let v = Vec3::new(random.between(-1.0, 1.0), random.between(-1.0, 1.0), random.between(-1.0, 1.0));
+        if (1e-3..1.0).contains(&v.length_squared()) {
+            return v.normalize();
+        }
     }
 }
 
 /// A camera in the scene's bounds or just above their floor, of 20 to 120 degrees.
-pub fn random_camera(stage: &Stage, random: &mut Random) -> Camera {
+pub fn random_camera(stage: &Stage, random: &mut SplitMix64) -> Camera {
     let bounds = stage.scene.bounds_ws();
-    let mut eye = bounds.min + bounds.size() * random.vector();
-    if random.unit() < 0.4 {
+    let place = |random: &mut SplitMix64| {
+        bounds.min + bounds.size() * Vec3::new(random.next_f32(), random.next_f32(), random.next_f32())
+    };
+    let mut eye = place(random);
+    if random.next_f32() < 0.4 {
         eye.y = bounds.min.y + 0.02 * bounds.size().y;
     }
-    let target = bounds.min + bounds.size() * random.vector();
-    let fov_y_rad = (20.0 + 100.0 * random.unit()).to_radians();
+    let target = place(random);
+    let fov_y_rad = (20.0 + 100.0 * random.next_f32()).to_radians();
     Camera::look_at("random", eye, target, fov_y_rad, 0.01)
+}
+
+/// Small views that nobody chose, at four samples: eight of each of three scenes, with 2 to 300 lights. Each is given with `forward`'s image of
+/// it and its name.
+pub fn random_views(seed: u64, mut each: impl FnMut(&Stage, &Settings, &Rgba8Image, &str)) {
+    let gpu = afterlight_testkit::gpu();
+    if afterlight_testkit::sample_counts(&gpu, &[4]).is_empty() {
+        return;
+    }
+    let mut random = SplitMix64::new(seed);
+    for scene in ["builtin:spheres", "builtin:colonnade?triangles=17000&texture=64", "builtin:intersect"] {
+        let stage = Stage::new(&gpu, scene);
+        for view in 0..8 {
+            let camera = random_camera(&stage, &mut random);
+            let lights = [2, 10, 60, 300][(random.next_f32() * 4.0) as usize];
+            let settings = Settings { samples: 4, ..stage.from(camera, (97, 53), lights) };
+            let reference = stage.image(find("forward").expect("a technique"), &settings);
+            each(&stage, &settings, &reference, &format!("{scene} view {view}, {lights} lights"));
+        }
+    }
 }
 
 /// PSNR in dB, infinite where equal.
@@ -239,56 +303,53 @@ pub fn compiled(name: &str, path: &Path, defines: &[&str], replaced: &[(&str, &s
     })
 }
 
-/// Compiles a shader with parts of a header's text replaced: `header` is the name by which shaders include it.
-pub fn compiled_with_header(name: &str, header: &str, replaced: &[(&str, &str)]) -> Shader {
-    compiled_variant_with_header(name, &[], header, replaced)
+/// What a compute shader of these tests, such as `logluv.comp`, writes into its buffer `Found`: so many floats, by so many groups. Parts of the
+/// text of the header that it tests are replaced.
+pub fn found_by(
+    stage: &Stage,
+    shader: &str,
+    (header, replaced): (&str, &[(&str, &str)]),
+    (floats, groups): (u64, u32),
+) -> Vec<f64> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests").join(format!("{shader}.glsl"));
+    let shader = in_temporary_folder(|changed| {
+        write_changed(changed, header, replaced);
+        compile(&format!("test/{shader}"), &path, path.parent().expect("a folder"), &[], changed)
+    });
+    let renderer = Renderer::with_scene(&stage.device, stage.uploaded.clone(), &stage.settings((8, 8), 1));
+    let prepared = renderer.unwrap_or_else(|e| panic!("{e}")).prepare_with(
+        find("forward").expect("a technique"),
+        &Params::default(),
+        |graph, _| {
+            let found = graph.buffer("test/found", BufferRole::Counters, 4 * floats);
+            let mut pass = graph.compute("test/finding", PassRole::Upkeep, &shader);
+            let found = pass.write("Found", found);
+            pass.dispatch([groups, 1, 1]);
+            pass.finish();
+            graph.keep(&found);
+        },
+    );
+    let mut prepared = prepared.unwrap_or_else(|e| panic!("{e}"));
+    prepared.run().unwrap_or_else(|e| panic!("{e}"));
+    let bytes = prepared.executor().read_buffer("test/found").unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!(bytes.len() as u64, 4 * floats);
+    bytes.chunks_exact(4).map(|b| f64::from(f32::from_le_bytes([b[0], b[1], b[2], b[3]]))).collect()
 }
 
-/// The same for a variant with defines; `name` is that of its shader, `#` and its own.
-pub fn compiled_variant_with_header(
-    name: &str,
-    defines: &[&str],
-    header: &str,
-    replaced: &[(&str, &str)],
-) -> Shader {
-    in_temporary_folder(|changed| {
-        let written = changed.join(header);
-        std::fs::create_dir_all(written.parent().expect("a folder")).expect("a temporary folder");
-        let text = replaced_text(&source(header), replaced);
-        std::fs::write(&written, text).expect("a file in the temporary folder");
-        let shader = name.split_once('#').map_or(name, |(shader, _)| shader);
-        let path = source(&format!("{shader}.glsl"));
-        compile(name, &path, path.parent().expect("a folder"), defines, changed)
-    })
-}
-
-/// Compiles a variant that a technique's `variants.txt` lists, with parts of a header's text replaced.
-pub fn variant_with_header(name: &str, header: &str, replaced: &[(&str, &str)]) -> Shader {
-    let [techniques, stages, _] = folders();
-    let prefix = name.split('/').next().expect("a folder's name");
-    let includes = [techniques.clone(), stages.clone()];
-    let listed =
-        manifest::read(prefix, &techniques.join(prefix), &includes).unwrap_or_else(|e| panic!("{e}"));
-    let variant = listed.into_iter().find(|variant| variant.name == name);
-    let variant = variant.unwrap_or_else(|| panic!("{name}: found no such variant"));
-    in_temporary_folder(|changed| {
-        let written = changed.join(header);
-        std::fs::create_dir_all(written.parent().expect("a folder")).expect("a temporary folder");
-        std::fs::write(&written, replaced_text(&source(header), replaced))
-            .expect("a file in the temporary folder");
-        let compiler = Compiler::new().override_dir(changed).include_dir(techniques).include_dir(stages);
-        compiler.compile(&variant).unwrap_or_else(|e| panic!("{e}")).shader
-    })
+/// Writes a header, with parts of its text replaced, to where includes find it before the real one. Returns the written file.
+fn write_changed(folder: &Path, header: &str, replaced: &[(&str, &str)]) -> PathBuf {
+    let written = folder.join(header);
+    std::fs::create_dir_all(written.parent().expect("a folder")).expect("a temporary folder");
+    std::fs::write(&written, replaced_text(&source(header), replaced))
+        .expect("a file in the temporary folder");
+    written
 }
 
 /// Compiles a variant by its full name, as its `variants.txt` says, with parts of a header's or a source's text replaced.
 pub fn compiled_variant(name: &str, header: &str, replaced: &[(&str, &str)]) -> Shader {
     let mut variant = variant(name);
     in_temporary_folder(|changed| {
-        let written = changed.join(header);
-        std::fs::create_dir_all(written.parent().expect("a folder")).expect("a temporary folder");
-        let path = source(header);
-        std::fs::write(&written, replaced_text(&path, replaced)).expect("a file in the temporary folder");
+        let (path, written) = (source(header), write_changed(changed, header, replaced));
         if variant.path == path {
             variant.path = written;
         } else if variant.source.as_ref() == Some(&path) {

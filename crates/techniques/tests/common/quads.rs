@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use afterlight_image::{Rgba8Image, encode_png};
-use afterlight_techniques::scene::{LoadOptions, Scene, load_bytes};
+use afterlight_techniques::scene::{LoadOptions, Scene, load_bytes, rng::SplitMix64};
 use glam::{DVec2, DVec3, DVec4};
 use serde_json::{Value, json};
 
@@ -50,12 +50,9 @@ impl Wrap {
     }
 }
 
-/// Bytes of SplitMix64 (Steele et al. 2014).
+/// Eight bytes at random.
 fn random_bytes(seed: u64) -> [u8; 8] {
-    let mut z = seed.wrapping_add(1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-    z = (z ^ z >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    z = (z ^ z >> 27).wrapping_mul(0x94D0_49BB_1331_11EB);
-    (z ^ z >> 31).to_le_bytes()
+    SplitMix64::new(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15)).next_u64().to_le_bytes()
 }
 
 /// Texels that no two channels and no two images share. Those of the normal map are vectors up to 45° off the axis, of length 1 to within
@@ -223,7 +220,7 @@ fn png(image: usize) -> Vec<u8> {
 }
 
 /// Header, JSON, binary chunk (glTF 2.0, section 4.4).
-fn binary(document: &Value, mut bin: Vec<u8>) -> Vec<u8> {
+pub fn binary(document: &Value, mut bin: Vec<u8>) -> Vec<u8> {
     let mut text = serde_json::to_vec(document).expect("JSON");
     text.resize(text.len().next_multiple_of(4), b' ');
     bin.resize(bin.len().next_multiple_of(4), 0);

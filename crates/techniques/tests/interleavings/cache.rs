@@ -1,6 +1,7 @@
 //! The memoization cache of `dais`: one bucket of `dais/memoize.glsl`.
 
 use crate::explorer::{Explored, Next, Protocol, Registers, Step, explore};
+use crate::lists::is_of;
 
 /// Of `memoize.glsl`, what [`Cache`] is a model of.
 const MODELLED: &str = "\
@@ -56,8 +57,7 @@ uint memoized(uint id) {
 /// The model and the shader are one.
 #[test]
 fn the_model_is_of_the_shader() {
-    let shader = std::fs::read_to_string(crate::common::source("dais/memoize.glsl")).expect("a shader");
-    assert!(shader.contains(MODELLED), "memoize.glsl has changed: change its model, then the text here");
+    is_of("dais/memoize.glsl", MODELLED);
 }
 
 /// Turns of the loop: enough that a fragment which has lost one can win the next.

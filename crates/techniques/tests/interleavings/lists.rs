@@ -3,7 +3,7 @@
 use crate::explorer::{Next, Protocol, Registers, Step, explore};
 
 /// Asserts that a shader has the text that a model is of.
-fn is_of(shader: &str, modelled: &str) {
+pub(crate) fn is_of(shader: &str, modelled: &str) {
     let text = std::fs::read_to_string(crate::common::source(shader)).expect("a shader");
     assert!(text.contains(modelled), "{shader} has changed: change its model, then the text in its test");
 }
