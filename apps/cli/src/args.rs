@@ -403,7 +403,7 @@ fn above_zero(text: &str) -> Result<f64, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::{CommandFactory as _, Parser as _};
+    use clap::CommandFactory as _;
 
     /// Commands that `verify` prints are read back, whatever its own time was.
     #[test]
