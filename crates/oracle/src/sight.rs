@@ -39,7 +39,7 @@ pub enum Seen {
 
 impl Seen {
     /// What a stored depth says, reversed, 0 for no surface: `(a z + b) / (c z + d)` is the view distance of a depth z. The range
-    /// holds what [`DEPTH_ROUNDING`] may have changed.
+    /// holds what rounding of depth on a device may have changed.
     pub fn of_depth(depth: f32, [a, b, c, d]: [f32; 4]) -> Seen {
         if depth == 0.0 {
             return Seen::Nothing;
@@ -92,7 +92,7 @@ impl<'a> Judge<'a> {
         Self { rays, camera, size_px, rounding_m }
     }
 
-    /// What a pixel may show, row 0 on top; `None` where rounding moves surfaces by more than [`WIDEST_PX`], so that nothing can be said.
+    /// What a pixel may show, row 0 on top; `None` where rounding moves surfaces by more than 1.5 pixels, so that nothing can be said.
     pub fn sight(&self, pixel: [u32; 2]) -> Option<Sight> {
         let (narrow, nearest_m) = self.around(pixel, SNAP_PX);
         let widened_px = SNAP_PX + self.rounding_m / self.pixel_width_m(nearest_m.max(0.0));
