@@ -292,22 +292,18 @@ fn clamped() -> Vec<Shader> {
 
 /// Depth as a plane over the screen in floats.
 fn planes() -> Vec<Shader> {
-    let nearer = "precise float nearer = t.depth_gain.x * float_of(edge_at_sample(e.at_p1, e.d20, s))
-                         + t.depth_gain.y * float_of(edge_at_sample(e.at_p2, e.d01, s));";
+    let nearer = "precise float sum = nearer.x + nearer.y;";
     let plane = "vec2 a = vec2(t.p1 - t.p0) / 256.0, b = vec2(t.p2 - t.p0) / 256.0;
         float area = float(doubled_area(t.p0, t.p1, t.p2));
         float u = (t.depth + t.depth_gain.x * area) - t.depth, v = (t.depth + t.depth_gain.y * area) - t.depth;
         vec2 slope = vec2(u * b.y - v * a.y, v * a.x - u * b.x) / (a.x * b.y - a.y * b.x);
-        float nearer = dot(slope, vec2(pixel) - vec2(t.p0) / 256.0 + sample_location(i));";
+        float sum = dot(slope, vec2(pixel) - vec2(t.p0) / 256.0 + sample_location(i));";
     mutants(
         RASTER,
         &[
             (nearer, plane),
-            (
-                "float depth_at(ScreenTriangle t, DepthEdges e, uint i)",
-                "float depth_at(ScreenTriangle t, ivec2 pixel, uint i)",
-            ),
-            ("depth_at(t, edges, i)", "depth_at(t, pixel, i)"),
+            ("DepthEdges e, PixelDepth p, uint i)", "DepthEdges e, PixelDepth p, ivec2 pixel, uint i)"),
+            ("depth_at(t, edges, at, i)", "depth_at(t, edges, at, pixel, i)"),
         ],
     )
 }

@@ -19,6 +19,12 @@ layout(constant_id = 11) const uint JOB_CAPACITY = 0u;
 
 const int BLOCK_PX = 8;
 
+// By how many whole STEPs an edge function may fall below its value here and still be inside: negative where it is not. No change between samples
+// is 2^29 STEPs, so that the sum of the two, of which a sample needs only the sign, stays within 32 bits.
+int steps_within(int64_t at, int least) {
+    return int(clamp((at - int64_t(least)) >> 4, -int64_t(1 << 30), int64_t(1 << 30)));
+}
+
 void main() {
     uint count = min(jobs_needed, JOB_CAPACITY);
     for (uint place = gl_WorkGroupID.x; place < count; place += gl_NumWorkGroups.x) {
@@ -47,12 +53,12 @@ void main() {
             }
             int64_t a0 = edge_at(e0, pixel * SUBPIXELS), a1 = edge_at(e1, pixel * SUBPIXELS),
                     a2 = edge_at(e2, pixel * SUBPIXELS);
+            ivec3 within = ivec3(steps_within(a0, e0.least), steps_within(a1, e1.least), steps_within(a2, e2.least));
             uint covered = 0u;
             for (uint i = 0u; i < SAMPLES; ++i) {
-                ivec2 s = sample_subpixels(i);
-                bool inside = edge_at_sample(a0, e0.d, s) >= int64_t(e0.least) && edge_at_sample(a1, e1.d, s) >= int64_t(e1.least)
-                    && edge_at_sample(a2, e2.d, s) >= int64_t(e2.least);
-                covered |= inside ? 1u << i : 0u;
+                ivec2 s = sample_steps(i);
+                ivec3 change = ivec3(edge_change(e0.d, s), edge_change(e1.d, s), edge_change(e2.d, s));
+                covered |= all(greaterThanEqual(within + change, ivec3(0))) ? 1u << i : 0u;
             }
             if (covered != 0u) {
                 keep_nearest(pixel, covered, t, DepthEdges(a2, a0, e2.d, e0.d), order, d);

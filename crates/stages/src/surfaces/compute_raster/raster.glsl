@@ -27,6 +27,8 @@ layout(set = 0, binding = 9, scalar) readonly buffer DrawCommands {
 };
 
 const int SUBPIXELS = 256;
+// Sample locations are multiples of 1/16 pixel.
+const int STEP = SUBPIXELS / 16;
 // Half the side of the square around the image's centre within which vertices are snapped as they are, pixels. A triangle that leaves it is
 // clipped to it first: edges stay straight, and coordinates of 24 bits and images of up to 16,384 pixels keep products of differences within
 // 51 bits. A float so far out still resolves 1/256 pixel.
@@ -120,28 +122,45 @@ bool screen_triangle(RasterDraw d, vec4 c0, vec4 c1, vec4 c2, out ScreenTriangle
     return true;
 }
 
+// Where sample i stands, steps of 1/16 pixel from the pixel's corner: a whole number.
+ivec2 sample_steps(uint i) {
+    return ivec2(sample_location(i) * float(SUBPIXELS / STEP));
+}
+
+// By how many STEPs the edge function of an edge d changes over these steps. 32 bits hold it: an edge spans at most 2^24 subpixels each way.
+int edge_change(ivec2 d, ivec2 steps) {
+    return d.x * steps.y - d.y * steps.x;
+}
+
 // Edge functions of p2 -> p0 and p0 -> p1 at a pixel's corner, and the edges: what depth is interpolated by.
 struct DepthEdges {
     EDGE at_p1, at_p2;
     ivec2 d20, d01;
 };
 
-// Edge function at a sample, from that at the pixel's corner.
-EDGE edge_at_sample(EDGE at_corner, ivec2 d, ivec2 sample_subpixels) {
-    return at_corner + EDGE(d.x) * EDGE(sample_subpixels.y) - EDGE(d.y) * EDGE(sample_subpixels.x);
-}
+// Depth over the samples of a pixel that a triangle covers: how much nearer than its farthest vertex one of them is, and by what it changes
+// from there.
+struct PixelDepth {
+    vec2 gain;          // for each STEP of the edge functions
+    vec2 nearer;        // at the sample that stands at `steps`
+    ivec2 steps;
+};
 
-ivec2 sample_subpixels(uint i) {
-    return ivec2(sample_location(i) * float(SUBPIXELS));
+// Only at one sample are 64 bits converted. That sample must be covered: its edge functions are not negative then, nor are those of any other
+// that is, so a change is no greater than the greater of the two, and what floats lose of it no more than what they lose of that.
+PixelDepth pixel_depth(ScreenTriangle t, DepthEdges e, uint covered_sample) {
+    ivec2 s = sample_steps(covered_sample);
+    EDGE at_p1 = e.at_p1 + EDGE(STEP) * EDGE(edge_change(e.d20, s)), at_p2 = e.at_p2 + EDGE(STEP) * EDGE(edge_change(e.d01, s));
+    return PixelDepth(t.depth_gain * float(STEP), t.depth_gain * vec2(float_of(at_p1), float_of(at_p2)), s);
 }
 
 // Depth at a sample that the triangle covers.
-float depth_at(ScreenTriangle t, DepthEdges e, uint i) {
-    ivec2 s = sample_subpixels(i);
+float depth_at(ScreenTriangle t, DepthEdges e, PixelDepth p, uint i) {
+    ivec2 steps = sample_steps(i) - p.steps;
     // Sums and products apart: with one of them fused, a triangle and its reverse would differ by a rounding.
-    precise float nearer = t.depth_gain.x * float_of(edge_at_sample(e.at_p1, e.d20, s))
-                         + t.depth_gain.y * float_of(edge_at_sample(e.at_p2, e.d01, s));
-    return min(t.depth + nearer, 1.0);
+    precise vec2 nearer = p.nearer + p.gain * vec2(edge_change(e.d20, steps), edge_change(e.d01, steps));
+    precise float sum = nearer.x + nearer.y;
+    return min(t.depth + sum, 1.0);
 }
 
 // The least value of the edge function from a to b that is inside: 0 where a sample exactly on the edge belongs to the triangle (top-left
@@ -185,11 +204,14 @@ bool passes_alpha(RasterDraw d, uint triangle, ivec2 pixel) {
 
 // Writes the triangle's key to every sample of the mask where it is the nearest so far. `order` is the triangle's place in the order of draws.
 void keep_nearest(ivec2 pixel, uint covered, ScreenTriangle t, DepthEdges edges, uint order, RasterDraw d) {
+    PixelDepth at = pixel_depth(t, edges, uint(findLSB(covered)));
+    uint depth_bits[SAMPLES];
     uint wins = 0u;
     for (uint i = 0u; i < SAMPLES; ++i) {
         if ((covered >> i & 1u) != 0u) {
-            float depth = depth_at(t, edges, i);
-            uint64_t key = packUint2x32(uvec2(~order, floatBitsToUint(depth)));
+            float depth = depth_at(t, edges, at, i);
+            depth_bits[i] = floatBitsToUint(depth);
+            uint64_t key = packUint2x32(uvec2(~order, depth_bits[i]));
             // If this plain read is out of date, the key was smaller: an atomic is done that was not needed, and no sample is lost.
             wins |= depth > 0.0 && key > sample_keys[key_index(pixel, i)] ? 1u << i : 0u;
         }
@@ -199,8 +221,7 @@ void keep_nearest(ivec2 pixel, uint covered, ScreenTriangle t, DepthEdges edges,
     }
     for (uint i = 0u; i < SAMPLES; ++i) {
         if ((wins >> i & 1u) != 0u) {
-            float depth = depth_at(t, edges, i);
-            atomicMax(sample_keys[key_index(pixel, i)], packUint2x32(uvec2(~order, floatBitsToUint(depth))));
+            atomicMax(sample_keys[key_index(pixel, i)], packUint2x32(uvec2(~order, depth_bits[i])));
         }
     }
 }

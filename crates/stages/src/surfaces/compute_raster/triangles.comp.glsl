@@ -43,8 +43,8 @@ void rasterize_small(ScreenTriangle t, ivec2 first, ivec2 last, uint order, Rast
             }
             uint covered = 0u;
             for (uint i = 0u; i < SAMPLES; ++i) {
-                ivec2 s = sample_subpixels(i);
-                ivec3 at = edge + ivec3(d0.x, d1.x, d2.x) * s.y - ivec3(d0.y, d1.y, d2.y) * s.x;
+                ivec2 s = sample_steps(i);
+                ivec3 at = edge + STEP * ivec3(edge_change(d0, s), edge_change(d1, s), edge_change(d2, s));
                 covered |= all(greaterThanEqual(at, least)) ? 1u << i : 0u;
             }
             if (covered != 0u) {
