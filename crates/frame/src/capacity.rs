@@ -79,28 +79,72 @@ impl Demand {
         Self { name, resource, first_word, capacity, fixed, slack_eighths: STEADY, varies }
     }
 
-    /// Reads the last frame's count.
-    pub fn read(&self, executor: &Executor) -> Result<Counter, TechniqueError> {
-        let bytes = executor.read_buffer(self.resource)?;
+    /// The buffer that counts.
+    pub fn resource(&self) -> ResourceId {
+        self.resource
+    }
+
+    /// What the frame fell short of, from the bytes of [`Self::resource`] after it: also where it found room, but the next one may not.
+    pub fn shortage(&self, bytes: &[u8]) -> Option<Shortage> {
+        let (needed, dropped) = self.words(bytes);
+        let Self { name, capacity, fixed, .. } = *self;
+        let shortage = Shortage { list: name, needed, capacity, dropped, fixed };
+        (shortage.is_felt() || !fixed && is_scarce(needed, capacity)).then_some(shortage)
+    }
+
+    /// What was needed and what was dropped, from the bytes of the counter's buffer. What fits drops nothing: where something was dropped and
+    /// the sum is still within the capacity, it has passed 2³² and begun anew.
+    fn words(&self, bytes: &[u8]) -> (u32, u32) {
         let word = |i: usize| {
             let i = self.first_word + i;
             bytes.get(4 * i..4 * i + 4).map_or(0, |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]))
         };
-        Ok(self.counted(word(0), word(1)))
+        self.unwrapped(word(0), word(1))
     }
 
-    /// The counter of two words from the device. What fits drops nothing: where something was dropped and the sum is still within the
-    /// capacity, it has passed 2³² and begun anew.
-    fn counted(&self, needed: u32, dropped: u32) -> Counter {
+    fn unwrapped(&self, needed: u32, dropped: u32) -> (u32, u32) {
         let has_wrapped = dropped > 0 && needed <= self.capacity;
-        Counter {
-            name: self.name.to_owned(),
-            needed: if has_wrapped { u32::MAX } else { needed },
-            capacity: self.capacity,
-            dropped,
-            fixed: self.fixed,
-        }
+        (if has_wrapped { u32::MAX } else { needed }, dropped)
     }
+
+    /// Reads the last frame's count.
+    pub fn read(&self, executor: &Executor) -> Result<Counter, TechniqueError> {
+        let (needed, dropped) = self.words(&executor.read_buffer(self.resource)?);
+        Ok(self.counted(needed, dropped))
+    }
+
+    fn counted(&self, needed: u32, dropped: u32) -> Counter {
+        let Self { name, capacity, fixed, .. } = *self;
+        let (needed, dropped) = self.unwrapped(needed, dropped);
+        Counter { name: name.to_owned(), needed, capacity, dropped, fixed }
+    }
+}
+
+/// What a frame needed of a list that had no room for it, or hardly any.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Shortage {
+    /// What is counted: `blocks`.
+    pub list: &'static str,
+    /// Elements that the frame needed; `u32::MAX` where their sum passed 2³² on the device.
+    pub needed: u32,
+    /// Elements that there was room for.
+    pub capacity: u32,
+    /// What was dropped for want of room, in the list's own unit.
+    pub dropped: u32,
+    /// Whether the capacity was set by a parameter.
+    pub fixed: bool,
+}
+
+impl Shortage {
+    /// Whether the frame lacked something, and not only the next one may.
+    pub fn is_felt(&self) -> bool {
+        self.dropped > 0 || self.needed > self.capacity
+    }
+}
+
+/// Whether so much of a list is needed that the next frame may find no room: less than a sixteenth is left.
+fn is_scarce(needed: u32, capacity: u32) -> bool {
+    needed > capacity - capacity / 16
 }
 
 /// Capacities known from the frames before, and the counters that the frame being recorded has.
@@ -125,6 +169,40 @@ impl Capacities {
     /// The counters that the frame has.
     pub fn demands(&self) -> Vec<Demand> {
         self.demands.borrow().clone()
+    }
+
+    /// The same capacities for another recording of the same lists.
+    pub fn again(&self) -> Self {
+        let demands = self.demands.borrow();
+        let free = demands.iter().filter(|demand| !demand.fixed);
+        Self {
+            known: free.map(|demand| (demand.name.to_owned(), demand.capacity)).collect(),
+            demands: RefCell::default(),
+        }
+    }
+
+    /// Whether this recording has as little room as the one that fell short.
+    pub fn lack(&self, shortages: &[Shortage]) -> bool {
+        let demands = self.demands.borrow();
+        let lacks = |shortage: &&Shortage| {
+            let demand = demands.iter().find(|demand| demand.name == shortage.list);
+            demand.is_some_and(|demand| !demand.fixed && is_scarce(shortage.needed, demand.capacity))
+        };
+        shortages.iter().any(|shortage| lacks(&shortage))
+    }
+
+    /// Capacities for another recording, with half as much again as a frame needed of the lists that it fell short of: a camera that goes on
+    /// moving needs more.
+    pub fn grown(&self, shortages: &[Shortage]) -> Self {
+        let mut grown = self.again();
+        for (name, capacity) in &mut grown.known {
+            if let Some(shortage) = shortages.iter().find(|shortage| shortage.list == name) {
+                let needed = u64::from(shortage.needed);
+                let room = u32::try_from(needed + needed / 2 + u64::from(SLACK / 8)).unwrap_or(u32::MAX);
+                *capacity = room.max(*capacity);
+            }
+        }
+        grown
     }
 
     /// Capacities for another recording, or `None` where those of this one fit what was counted.

@@ -1,6 +1,6 @@
 //! What a technique is given to record a frame.
 
-use std::ops::Range;
+use std::{borrow::Cow, ops::Range};
 
 use afterlight_graph::{
     BufferHandle, BufferRole, Graph, ImageHandle, ImageInfo, PassRole,
@@ -8,14 +8,12 @@ use afterlight_graph::{
 };
 use afterlight_shader::Shader;
 
-use bytemuck::Zeroable as _;
-
 use crate::{
-    Board, Params, Slots, TechniqueError,
+    Board, Params, Slots, TechniqueError, ViewInputs,
     capacity::Capacities,
     scene::{
         BUCKETS, SceneGpu,
-        draw_list::{DrawCommand, Rows, command, displaced},
+        draw_list::{Rows, displaced},
         lights::SceneLights,
     },
     set_constants, views,
@@ -41,7 +39,7 @@ pub struct Frame<'a> {
     pub tessellate_px: Option<f32>,
     /// How far displacement moves a tessellated surface along each axis at most, m.
     pub displacement_m: f32,
-    /// World to clip. A technique that uses it while recording is recorded again when the camera moves.
+    /// World to clip. Who uses it while recording says so ([`Frame::holds_for_this_view`]).
     pub clip_from_world: glam::Mat4,
     /// How much less view distances are in this frame than from the camera, m: the eye of an orthographic camera that is far from the
     /// scene is moved towards it ([`CameraView::fitted`](crate::CameraView::fitted)).
@@ -56,8 +54,12 @@ pub struct Frame<'a> {
     pub device: &'a gpu::Device,
     /// Capacities that earlier frames of the same view asked for.
     pub capacities: &'a Capacities,
-    /// Draws that the eye has in view, by bucket, in drawing order.
+    /// Draws that the eye has in view, by bucket, in drawing order. Who uses it while recording says so ([`Frame::holds_for_this_view`]).
     pub visible: &'a [Vec<u32>; BUCKETS],
+    /// What is written anew for each view.
+    pub inputs: &'a ViewInputs,
+    /// Whether the frame will be run from other views too: what some view needs is recorded, be it empty in this one.
+    pub moves: bool,
     /// What the parts of the frame hand on.
     pub board: Board,
 }
@@ -172,27 +174,16 @@ impl Frame<'_> {
         name: &str,
         rows: Range<u32>,
     ) -> Result<DrawCommands, TechniqueError> {
-        let rows = Rows::new(self.clip_from_world, rows, self.height_px);
-        let mut commands: Vec<DrawCommand> = Vec::new();
-        let (mut first, mut counts) = ([0; BUCKETS + 1], [0; BUCKETS]);
-        for (bucket, visible) in self.visible.iter().enumerate() {
-            let start = commands.len();
-            let infos = visible.iter().map(|draw| (&self.scene.draw_infos[*draw as usize], *draw));
-            let reached =
-                infos.filter(|(info, _)| rows.touch(&displaced(&info.bounds_ws, self.displacement_m)));
-            commands.extend(reached.map(|(info, draw)| command(info, draw)));
-            counts[bucket] = (commands.len() - start) as u32;
-            // A bucket that the scene has is drawn, be it with no command: passes bind what its shaders read and write.
-            let is_there = self.scene.bucket_first[bucket] < self.scene.bucket_first[bucket + 1];
-            if is_there && counts[bucket] == 0 {
-                commands.push(DrawCommand::zeroed());
-            }
-            first[bucket + 1] = commands.len() as u32;
-        }
-        Ok(DrawCommands {
-            commands: self.table(graph, name, BufferRole::Scene, bytemuck::cast_slice(&commands))?,
-            counts: self.table(graph, &format!("{name} counts"), BufferRole::Scene, &counts)?,
-            first,
+        self.inputs.declare_draws(self.device, graph, name, self.scene, move |view| {
+            let settings = view.settings;
+            let rows = Rows::new(view.camera.clip_from_world, rows.clone(), settings.height_px);
+            let displacement_m = settings.effects.tessellation.displacement_m();
+            Cow::Owned(view.visible.each_ref().map(|visible| {
+                let infos = visible.iter().filter(|draw| {
+                    rows.touch(&displaced(&view.scene.draw_infos[**draw as usize].bounds_ws, displacement_m))
+                });
+                infos.copied().collect::<Vec<u32>>()
+            }))
         })
     }
 

@@ -16,6 +16,7 @@ mod draws;
 mod effects;
 mod error;
 mod frame;
+mod inputs;
 pub mod scene;
 mod settings;
 mod slots;
@@ -33,6 +34,7 @@ pub use effects::{
 };
 pub use error::TechniqueError;
 pub use frame::{DrawCommands, Frame, SceneBuffers};
+pub use inputs::{View, ViewInput, ViewInputs, put};
 pub use params::{ParamError, ParamInfo, ParamKind, ParamSet, Params};
 pub use scene::{
     SceneGpu,

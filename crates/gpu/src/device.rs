@@ -44,17 +44,28 @@ pub(crate) struct DeviceInner {
     pub memory: vk::PhysicalDeviceMemoryProperties,
     pub queue_family: u32,
     without_float_stencil: bool,
-    queue: Mutex<vk::Queue>,
+    queue: Mutex<Queue>,
+    /// Counts submissions: its value is the number of the last one that is done, and all before it are.
+    timeline: vk::Semaphore,
     /// `None` only while the device is being dropped.
     allocator: Mutex<Option<Allocator>>,
     pub set_layouts: SetLayoutCache,
     pub pipelines: PipelineStore,
     pub samplers: SamplerStore,
-    /// Command pools, query pools and fences that no encoder uses at the moment.
+    /// Command pools and query pools that no encoder uses at the moment.
     recorders: Mutex<Vec<Recorder>>,
     /// Dropped last: everything above is a child of it.
     pub instance: Instance,
 }
+
+/// The queue, and how many submissions it has been given.
+struct Queue {
+    raw: vk::Queue,
+    submitted: u64,
+}
+
+/// Number of a submission to the device's queue. They are done in this order.
+pub(crate) type Submission = u64;
 
 /// Locks `mutex`; the data that this crate guards stays valid when a thread panics, so a poisoned lock is taken all the same.
 pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -118,6 +129,15 @@ impl Device {
                 });
             }
         };
+        let timeline = match create_timeline(&raw) {
+            Ok(timeline) => timeline,
+            Err(error) => {
+                drop(allocator);
+                // SAFETY: nothing that was made of the device is left.
+                unsafe { raw.destroy_device(None) };
+                return Err(error);
+            }
+        };
         let Detected { info, features, queue_family, .. } = detected;
         let pipelines = PipelineStore::new(&raw, &info, options.pipeline_cache_dir.as_deref());
         // SAFETY: `physical` belongs to the instance.
@@ -131,7 +151,8 @@ impl Device {
             memory,
             queue_family,
             without_float_stencil: options.without_float_stencil,
-            queue: Mutex::new(queue),
+            queue: Mutex::new(Queue { raw: queue, submitted: 0 }),
+            timeline,
             allocator: Mutex::new(Some(allocator)),
             set_layouts: SetLayoutCache::default(),
             pipelines,
@@ -201,12 +222,24 @@ impl Device {
     /// # Errors
     /// A driver that cannot give a command pool.
     pub fn encoder(&self) -> Result<Encoder, GpuError> {
+        self.encoder_for(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT)
+    }
+
+    /// Begins to record commands that are submitted many times ([`Encoder::finish`]).
+    ///
+    /// # Errors
+    /// A driver that cannot give a command pool.
+    pub fn encoder_for_many(&self) -> Result<Encoder, GpuError> {
+        self.encoder_for(vk::CommandBufferUsageFlags::empty())
+    }
+
+    fn encoder_for(&self, how_often: vk::CommandBufferUsageFlags) -> Result<Encoder, GpuError> {
         let idle = lock(&self.0.recorders).pop();
         let recorder = match idle {
             Some(recorder) => recorder,
             None => Recorder::new(self)?,
         };
-        Encoder::new(self.clone(), recorder)
+        Encoder::new(self.clone(), recorder, how_often)
     }
 
     /// Submits what `encoder` recorded, waits for it and returns its timestamps and statistics.
@@ -214,20 +247,47 @@ impl Device {
     /// # Errors
     /// [`GpuError::DeviceLost`] with the last label whose end was reached; a recording that the driver refuses.
     pub fn submit(&self, encoder: Encoder) -> Result<Completed, GpuError> {
-        encoder.submit_and_wait()
+        let mut recording = encoder.finish()?;
+        recording.submit()?;
+        recording.wait()?;
+        let mut completed = Completed::default();
+        recording.collect(&mut completed)?;
+        Ok(completed)
     }
 
     pub(crate) fn give_back(&self, recorder: Recorder) {
         lock(&self.0.recorders).push(recorder);
     }
 
-    /// Submits one command buffer with a fence.
-    pub(crate) fn submit_raw(&self, commands: vk::CommandBuffer, fence: vk::Fence) -> Result<(), vk::Result> {
+    /// Submits one command buffer, whose resources the caller holds until the submission is done.
+    pub(crate) fn submit_raw(&self, commands: vk::CommandBuffer) -> Result<Submission, vk::Result> {
+        let mut queue = lock(&self.0.queue);
+        let number = queue.submitted + 1;
         let commands = [vk::CommandBufferSubmitInfo::default().command_buffer(commands)];
-        let submit = [vk::SubmitInfo2::default().command_buffer_infos(&commands)];
-        let queue = lock(&self.0.queue);
-        // SAFETY: the queue is locked; the command buffer has ended and its resources are held until the fence is signalled.
-        unsafe { self.0.raw.queue_submit2(*queue, &submit, fence) }
+        let signals = [vk::SemaphoreSubmitInfo::default()
+            .semaphore(self.0.timeline)
+            .value(number)
+            .stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)];
+        let submit =
+            [vk::SubmitInfo2::default().command_buffer_infos(&commands).signal_semaphore_infos(&signals)];
+        // SAFETY: the queue is locked; the command buffer has ended and its resources are held until it is done.
+        unsafe { self.0.raw.queue_submit2(queue.raw, &submit, vk::Fence::null()) }?;
+        queue.submitted = number;
+        Ok(number)
+    }
+
+    /// Waits until a submission is done.
+    pub(crate) fn wait_for(&self, submission: Submission) -> Result<(), vk::Result> {
+        let (semaphores, values) = ([self.0.timeline], [submission]);
+        let info = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
+        // SAFETY: the semaphore lives as long as the device, and the submission will signal that value.
+        unsafe { self.0.raw.wait_semaphores(&info, u64::MAX) }
+    }
+
+    /// Whether a submission is done.
+    pub(crate) fn has_done(&self, submission: Submission) -> Result<bool, vk::Result> {
+        // SAFETY: the semaphore lives as long as the device.
+        Ok(unsafe { self.0.raw.get_semaphore_counter_value(self.0.timeline) }? >= submission)
     }
 
     /// Runs `use_allocator` with the allocator locked.
@@ -285,6 +345,7 @@ impl Drop for DeviceInner {
             self.pipelines.destroy(&self.raw);
             self.set_layouts.destroy(&self.raw);
             self.samplers.destroy(&self.raw);
+            self.raw.destroy_semaphore(self.timeline, None);
             drop(allocator);
             self.raw.destroy_device(None);
         }
@@ -326,6 +387,13 @@ fn choose(
 
 fn kind_rank(kind: &str) -> usize {
     ["discrete", "integrated", "virtual", "cpu"].iter().position(|&k| k == kind).unwrap_or(4)
+}
+
+fn create_timeline(device: &ash::Device) -> Result<vk::Semaphore, GpuError> {
+    let mut kind = vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
+    let info = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
+    // SAFETY: the device has the feature, as every device of Vulkan 1.3 must.
+    unsafe { device.create_semaphore(&info, None) }.map_err(GpuError::call("vkCreateSemaphore"))
 }
 
 fn create_device(

@@ -1,8 +1,8 @@
 //! Recording commands, submitting them, and what comes back: timestamps and statistics.
 
-use crate::device::{c_name, lost};
-use crate::recorder::{CHECKPOINTS_MAX, QUERIES_PER_POOL, Recorder, query_pool, query_results};
-use crate::{Buffer, DescriptorSet, Device, GpuError, Image, ImageView, Pipeline, PushSet};
+use crate::device::c_name;
+use crate::recorder::{CHECKPOINTS_MAX, QUERIES_PER_POOL, Recorder, query_pool};
+use crate::{Buffer, DescriptorSet, Device, GpuError, Image, ImageView, Pipeline, PushSet, Recording};
 use ash::vk;
 
 /// What is counted, in the order of the flags' bits, which is the order of the results.
@@ -199,12 +199,12 @@ pub struct Statistics {
 }
 
 /// What a submission brought back.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Completed {
-    ticks: Vec<u64>,
-    tick_ns: f64,
-    tick_mask: u64,
-    statistics: Vec<Statistics>,
+    pub(crate) ticks: Vec<u64>,
+    pub(crate) tick_ns: f64,
+    pub(crate) tick_mask: u64,
+    pub(crate) statistics: Vec<Statistics>,
 }
 
 impl Completed {
@@ -221,6 +221,15 @@ impl Completed {
         Some(ticks as f64 * self.tick_ns)
     }
 
+    /// The device's time of a timestamp, nanoseconds since some moment of its own; `None` where the queue has no timestamps. It begins anew
+    /// where the device's counter does.
+    ///
+    /// # Panics
+    /// If the timestamp is of another encoder with more of them.
+    pub fn ns(&self, id: TimestampId) -> Option<f64> {
+        (self.tick_mask != 0).then(|| (self.ticks[id.0 as usize] & self.tick_mask) as f64 * self.tick_ns)
+    }
+
     /// What a query counted; `None` where the device has no statistics queries.
     pub fn statistics(&self, id: StatisticsId) -> Option<Statistics> {
         self.statistics.get(id.0 as usize).copied()
@@ -229,7 +238,7 @@ impl Completed {
 
 /// The resources that recorded commands use, kept alive until the device is done with them.
 #[allow(dead_code)] // Held for its drop alone.
-enum Kept {
+pub(crate) enum Held {
     Buffer(Buffer),
     Image(Image),
     PushSet(PushSet),
@@ -244,7 +253,7 @@ pub struct Encoder {
     /// `None` only once submitted or dropped.
     recorder: Option<Recorder>,
     commands: vk::CommandBuffer,
-    kept: Vec<Kept>,
+    kept: Vec<Held>,
     bound: Option<Pipeline>,
     is_rendering: bool,
     timestamp_count: u32,
@@ -256,8 +265,12 @@ pub struct Encoder {
 }
 
 impl Encoder {
-    pub(crate) fn new(device: Device, mut recorder: Recorder) -> Result<Encoder, GpuError> {
-        if let Err(error) = recorder.begin(&device.0.raw) {
+    pub(crate) fn new(
+        device: Device,
+        mut recorder: Recorder,
+        how_often: vk::CommandBufferUsageFlags,
+    ) -> Result<Encoder, GpuError> {
+        if let Err(error) = recorder.begin(&device.0.raw, how_often) {
             device.give_back(recorder);
             return Err(error);
         }
@@ -282,11 +295,11 @@ impl Encoder {
     }
 
     fn keep_buffer(&mut self, buffer: &Buffer) {
-        self.kept.push(Kept::Buffer(buffer.clone()));
+        self.kept.push(Held::Buffer(buffer.clone()));
     }
 
     fn keep_image(&mut self, image: &Image) {
-        self.kept.push(Kept::Image(image.clone()));
+        self.kept.push(Held::Image(image.clone()));
     }
 
     /// Records barriers, all at once.
@@ -346,8 +359,8 @@ impl Encoder {
             .image_memory_barriers(&raw_images);
         // SAFETY: the command buffer is recording; the resources are alive, and kept below. So for every command.
         unsafe { self.raw().cmd_pipeline_barrier2(self.commands, &info) };
-        self.kept.extend(buffers.iter().map(|b| Kept::Buffer(b.buffer.clone())));
-        self.kept.extend(images.iter().map(|b| Kept::Image(b.image.clone())));
+        self.kept.extend(buffers.iter().map(|b| Held::Buffer(b.buffer.clone())));
+        self.kept.extend(images.iter().map(|b| Held::Image(b.image.clone())));
     }
 
     /// Begins to draw. Viewport and scissor become the whole extent, culling is off, front faces are counter-clockwise in
@@ -438,7 +451,7 @@ impl Encoder {
                 &set.0.writes,
             );
         }
-        self.kept.push(Kept::PushSet(set.clone()));
+        self.kept.push(Held::PushSet(set.clone()));
     }
 
     /// Binds a long-lived set as set 1 of the bound pipeline.
@@ -452,7 +465,7 @@ impl Encoder {
             let (point, layout) = (pipeline.bind_point, pipeline.layout);
             self.raw().cmd_bind_descriptor_sets(self.commands, point, layout, 1, &[set.0.raw], &[]);
         }
-        self.kept.push(Kept::Set(set.clone()));
+        self.kept.push(Held::Set(set.clone()));
     }
 
     /// Sets push constants of the bound pipeline, from their begin.
@@ -532,7 +545,7 @@ impl Encoder {
         let offsets: Vec<_> = buffers.iter().map(|(_, offset)| *offset).collect();
         // SAFETY: as in `barriers`.
         unsafe { self.raw().cmd_bind_vertex_buffers(self.commands, first, &raw, &offsets) };
-        self.kept.extend(buffers.iter().map(|(b, _)| Kept::Buffer((*b).clone())));
+        self.kept.extend(buffers.iter().map(|(b, _)| Held::Buffer((*b).clone())));
     }
 
     /// Binds the index buffer from `offset` bytes on.
@@ -821,11 +834,14 @@ impl Encoder {
         }
     }
 
-    pub(crate) fn submit_and_wait(mut self) -> Result<Completed, GpuError> {
-        self.run()
-    }
-
-    fn run(&mut self) -> Result<Completed, GpuError> {
+    /// Ends the recording.
+    ///
+    /// # Errors
+    /// Commands that the driver refuses.
+    ///
+    /// # Panics
+    /// Within rendering, or while a query counts.
+    pub fn finish(mut self) -> Result<Recording, GpuError> {
         assert!(!self.is_rendering, "submit within rendering");
         // A query without an end would be waited for without end.
         assert!(self.counting.is_none(), "submit while {:?} counts", self.counting);
@@ -841,46 +857,10 @@ impl Encoder {
         // SAFETY: the command buffer is recording and outside rendering.
         unsafe { self.raw().end_command_buffer(self.commands) }
             .map_err(GpuError::call("vkEndCommandBuffer"))?;
-        let label_count = self.labels.len();
-        let recorder = self.recorder.as_mut().expect("the encoder is recording");
-        if let Some(checkpoints) = &mut recorder.checkpoints {
-            checkpoints.clear(label_count);
-        }
-        let done =
-            self.device.submit_raw(recorder.commands, recorder.fence).map_err(|r| ("vkQueueSubmit2", r));
-        let done = done.and_then(|()| recorder.wait(&self.device.0.raw).map_err(|r| ("vkWaitForFences", r)));
-        if let Err((call, result)) = done {
-            return Err(lost(call, self.last_label().unwrap_or("none"))(result));
-        }
-        self.collect()
-    }
-
-    /// The last label of the submission whose end the device has reached.
-    fn last_label(&self) -> Option<&str> {
-        let checkpoints = self.recorder.as_ref()?.checkpoints.as_ref()?;
-        checkpoints.last_reached(self.labels.len()).map(|i| self.labels[i].as_str())
-    }
-
-    fn collect(&mut self) -> Result<Completed, GpuError> {
-        let features = self.device.features();
-        let valid_bits = features.timestamp_valid_bits;
-        let tick_mask = match valid_bits {
-            0 => 0,
-            64.. => u64::MAX,
-            bits => (1 << bits) - 1,
-        };
-        let recorder = self.recorder.as_ref().expect("the encoder is recording");
-        let raw = &self.device.0.raw;
-        let timestamp_count = if valid_bits > 0 { self.timestamp_count } else { 0 };
-        let ticks = query_results::<u64>(raw, &recorder.timestamp_pools, timestamp_count)?;
-        let statistics_count = if features.pipeline_statistics { self.statistics_count } else { 0 };
-        let counts = query_results::<[u64; 7]>(raw, &recorder.statistics_pools, statistics_count)?;
-        Ok(Completed {
-            ticks,
-            tick_ns: f64::from(features.timestamp_period_ns),
-            tick_mask,
-            statistics: counts.into_iter().map(statistics).collect(),
-        })
+        let recorder = self.recorder.take().expect("the encoder is recording");
+        let counts = [self.timestamp_count, self.statistics_count];
+        let (held, labels) = (std::mem::take(&mut self.kept), std::mem::take(&mut self.labels));
+        Ok(Recording::new(self.device.clone(), recorder, held, labels, counts))
     }
 }
 
@@ -893,7 +873,7 @@ impl Drop for Encoder {
 }
 
 /// In the order of [`STATISTICS`].
-fn statistics(counts: [u64; 7]) -> Statistics {
+pub(crate) fn statistics(counts: [u64; 7]) -> Statistics {
     let [
         input_vertices,
         input_primitives,
@@ -984,27 +964,6 @@ fn stencil_attachment(stencil: &StencilAttachment<'_>) -> vk::RenderingAttachmen
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::DeviceOptions;
-
-    #[test]
-    fn the_last_label_reached_is_known() {
-        let device = Device::open(&DeviceOptions::default()).expect("a device");
-        // Twice, since the second encoder gets the words of the first.
-        for names in [&["a", "b", "c"][..], &["d"]] {
-            let mut encoder = device.encoder().expect("an encoder");
-            for name in names {
-                encoder.begin_label(name);
-                encoder.end_label();
-            }
-            encoder.begin_label("never closed");
-            encoder.run().expect("done");
-            assert_eq!(encoder.last_label(), names.last().copied());
-        }
-        let mut encoder = device.encoder().expect("an encoder");
-        encoder.begin_label("outer");
-        encoder.run().expect("done");
-        assert_eq!(encoder.last_label(), None);
-    }
 
     #[test]
     fn time_passes_over_an_overflow_of_the_counter() {

@@ -27,6 +27,7 @@ mod instance;
 mod memory;
 mod pipeline;
 mod recorder;
+mod recording;
 mod sampler;
 mod upload;
 
@@ -47,5 +48,6 @@ pub use pipeline::{
     BlendEquation, BlendState, ComputePipelineDesc, DepthState, Pipeline, RasterPipelineDesc,
     RequiredSubgroup, ShaderCode, StencilFace, StencilState, VertexAttribute, VertexBinding,
 };
+pub use recording::Recording;
 pub use sampler::{Sampler, SamplerDesc};
 pub use upload::{UPLOAD_RING_BYTES, Uploader};

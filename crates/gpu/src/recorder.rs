@@ -1,4 +1,4 @@
-//! What encoders and uploaders record with: command buffer, fence, query pools, checkpoint words.
+//! What encoders and uploaders record with: command buffer, query pools, checkpoint words.
 
 use crate::device::lost;
 use crate::memory::MemoryKind;
@@ -12,12 +12,11 @@ pub(crate) const QUERIES_PER_POOL: u32 = 128;
 /// Labels of one submission that a lost device can name; later ones are recorded without a checkpoint.
 pub(crate) const CHECKPOINTS_MAX: usize = 1024;
 
-/// A command pool with one command buffer, its fence, query pools and checkpoint words: what an encoder records with.
+/// A command pool with one command buffer, query pools and checkpoint words: what an encoder records with.
 /// It is used again after the submission is done.
 pub(crate) struct Recorder {
     pool: vk::CommandPool,
     pub commands: vk::CommandBuffer,
-    pub fence: vk::Fence,
     pub timestamp_pools: Vec<vk::QueryPool>,
     pub statistics_pools: Vec<vk::QueryPool>,
     pub checkpoints: Option<Checkpoints>,
@@ -46,7 +45,6 @@ impl Recorder {
         let mut recorder = Recorder {
             pool,
             commands: vk::CommandBuffer::null(),
-            fence: vk::Fence::null(),
             timestamp_pools: Vec::new(),
             statistics_pools: Vec::new(),
             checkpoints: None,
@@ -60,12 +58,6 @@ impl Recorder {
             .map_err(GpuError::call("vkAllocateCommandBuffers"))
             .and_then(|commands| {
                 recorder.commands = commands[0];
-                // SAFETY: the device is alive.
-                unsafe { raw.create_fence(&vk::FenceCreateInfo::default(), None) }
-                    .map_err(GpuError::call("vkCreateFence"))
-            })
-            .and_then(|fence| {
-                recorder.fence = fence;
                 Checkpoints::new(device)
             });
         match made {
@@ -81,28 +73,28 @@ impl Recorder {
         }
     }
 
-    /// Resets the pool and begins the command buffer anew.
-    pub fn begin(&mut self, device: &ash::Device) -> Result<(), GpuError> {
-        // SAFETY: the last submission of this recorder is done, so its commands and queries are free.
+    /// Resets the pool and begins the command buffer anew; `usage` says how often it will be submitted.
+    pub fn begin(
+        &mut self,
+        device: &ash::Device,
+        usage: vk::CommandBufferUsageFlags,
+    ) -> Result<(), GpuError> {
+        self.reset_queries(device);
+        // SAFETY: the last submission of this recorder is done, so its commands are free.
         unsafe {
             device
                 .reset_command_pool(self.pool, vk::CommandPoolResetFlags::empty())
                 .map_err(GpuError::call("vkResetCommandPool"))?;
-            for &pool in self.timestamp_pools.iter().chain(&self.statistics_pools) {
-                device.reset_query_pool(pool, 0, QUERIES_PER_POOL);
-            }
-            let info =
-                vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
+            let info = vk::CommandBufferBeginInfo::default().flags(usage);
             device.begin_command_buffer(self.commands, &info).map_err(GpuError::call("vkBeginCommandBuffer"))
         }
     }
 
-    /// Waits for the fence of the submission and resets it.
-    pub fn wait(&self, device: &ash::Device) -> Result<(), vk::Result> {
-        // SAFETY: the fence belongs to this recorder and was submitted.
-        unsafe {
-            device.wait_for_fences(&[self.fence], true, u64::MAX)?;
-            device.reset_fences(&[self.fence])
+    /// Makes all queries ready to be used once more. The last submission of this recorder must be done.
+    pub fn reset_queries(&mut self, device: &ash::Device) {
+        for &pool in self.timestamp_pools.iter().chain(&self.statistics_pools) {
+            // SAFETY: the queries are this recorder's, and the device is done with them.
+            unsafe { device.reset_query_pool(pool, 0, QUERIES_PER_POOL) };
         }
     }
 
@@ -114,7 +106,6 @@ impl Recorder {
             for pool in self.timestamp_pools.into_iter().chain(self.statistics_pools) {
                 device.destroy_query_pool(pool, None);
             }
-            device.destroy_fence(self.fence, None);
             device.destroy_command_pool(self.pool, None);
             if let Some(checkpoints) = self.checkpoints {
                 device.destroy_buffer(checkpoints.buffer, None);
@@ -189,18 +180,20 @@ pub(crate) fn query_pool(
     Ok(pools[place])
 }
 
-/// Results of the first `count` queries, in order.
+/// Puts the results of the first `count` queries into `results`, in order.
 pub(crate) fn query_results<T: bytemuck::Pod>(
     device: &ash::Device,
     pools: &[vk::QueryPool],
     count: u32,
-) -> Result<Vec<T>, GpuError> {
-    let mut results = vec![T::zeroed(); count as usize];
+    results: &mut Vec<T>,
+) -> Result<(), GpuError> {
+    results.clear();
+    results.resize(count as usize, T::zeroed());
     let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
     for (part, &pool) in results.chunks_mut(QUERIES_PER_POOL as usize).zip(pools) {
         // SAFETY: all of these queries were used in a submission that is done; `T` is as many u64 as a query gives.
         unsafe { device.get_query_pool_results(pool, 0, part, flags) }
             .map_err(lost("vkGetQueryPoolResults", "all"))?;
     }
-    Ok(results)
+    Ok(())
 }

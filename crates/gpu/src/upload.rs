@@ -3,7 +3,7 @@
 //! Uploads pass through a ring of staging memory: while the device copies one part of it the next is filled. Where the
 //! host can map the target itself (CPU devices, integrated GPUs) buffers are written without a copy.
 
-use crate::device::lost;
+use crate::device::{Submission, lost};
 use crate::encoder::{Access, ImageBarrier};
 use crate::format::format_info;
 use crate::recorder::Recorder;
@@ -35,7 +35,7 @@ struct Part {
     staging: Buffer,
     used_bytes: u64,
     is_recording: bool,
-    is_in_flight: bool,
+    in_flight: Option<Submission>,
     /// Targets of copies, held until they are done.
     buffers: Vec<Buffer>,
 }
@@ -292,14 +292,14 @@ impl Uploader {
                 staging,
                 used_bytes: 0,
                 is_recording: false,
-                is_in_flight: false,
+                in_flight: None,
                 buffers: Vec::new(),
             });
         }
         let part = &mut self.parts[self.current];
         part.wait(&self.device)?;
         if !part.is_recording {
-            part.recorder_mut().begin(&self.device.0.raw)?;
+            part.recorder_mut().begin(&self.device.0.raw, vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT)?;
             part.is_recording = true;
             part.used_bytes = 0;
         }
@@ -308,13 +308,12 @@ impl Uploader {
 
     fn submit_current(&mut self) -> Result<(), GpuError> {
         let part = &mut self.parts[self.current];
-        let (commands, fence) = (part.commands(), part.recorder_mut().fence);
+        let commands = part.commands();
         // SAFETY: the command buffer is recording.
         unsafe { self.device.0.raw.end_command_buffer(commands) }
             .map_err(GpuError::call("vkEndCommandBuffer"))?;
         part.is_recording = false;
-        self.device.submit_raw(commands, fence).map_err(lost("vkQueueSubmit2", "upload"))?;
-        part.is_in_flight = true;
+        part.in_flight = Some(self.device.submit_raw(commands).map_err(lost("vkQueueSubmit2", "upload"))?);
         Ok(())
     }
 
@@ -346,9 +345,9 @@ impl Part {
     }
 
     fn wait(&mut self, device: &Device) -> Result<(), GpuError> {
-        if self.is_in_flight {
-            self.recorder_mut().wait(&device.0.raw).map_err(lost("vkWaitForFences", "upload"))?;
-            self.is_in_flight = false;
+        if let Some(submission) = self.in_flight {
+            device.wait_for(submission).map_err(lost("vkWaitSemaphores", "upload"))?;
+            self.in_flight = None;
             self.buffers.clear();
         }
         Ok(())

@@ -42,7 +42,7 @@ pub use declare::{
     Subresource, VertexAttribute, VertexLayout, VertexStream,
 };
 pub use error::GraphError;
-pub use execute::{Executor, ResourceKey};
+pub use execute::{Executor, FrameSlot, FrameTimes, ResourceKey};
 pub use plan::{
     Access, Barrier, MemoryNeed, Placement, Plan, PlannedHeap, PlannedPass, PlannedResource, Requirements,
     Traffic,

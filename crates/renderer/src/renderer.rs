@@ -1,21 +1,22 @@
 //! From a scene and a technique to an image.
 
-use std::sync::Arc;
+use std::{borrow::Cow, sync::Arc};
 
 use afterlight_graph::{
-    BufferRole, Executor, FrameReport, Graph, ImageHandle, ResourceId,
+    BufferRole, Executor, Graph, ImageHandle, ResourceId,
     gpu::{self, vk},
 };
-use afterlight_scene::Scene;
+use afterlight_scene::{Camera, Scene};
 use afterlight_shader::{Shader, structs::FrameConstants};
 
+use crate::prepared::{Kept, Prepared, Viewed};
 use afterlight_frame::{
-    Board, CameraView, Cull, DrawParams, Frame, LightPairs, MAX_DISPLACEMENT_MM, MIN_TESSELLATE_PX,
-    OpaqueDepth, Params, SceneBuffers, SceneLights, Settings, Technique, TechniqueError, TessellationEffect,
+    Board, CameraView, Cull, DrawParams, Frame, MAX_DISPLACEMENT_MM, MIN_TESSELLATE_PX, OpaqueDepth, Params,
+    SceneBuffers, SceneLights, Settings, Technique, TechniqueError, TessellationEffect, View, ViewInputs,
     camera_view::{background_radiance, coarse_depth_warning},
-    capacity::{self, Capacities, Counter, Demand},
-    completed,
-    scene::{SceneGpu, draw_list::DrawList},
+    capacity::{self, Capacities},
+    completed, put,
+    scene::{SceneGpu, draw_list::DrawChoice},
     upload::upload_slice,
     views,
 };
@@ -34,6 +35,16 @@ const RECORDINGS_MAX: u32 = 8;
 
 /// Layout in which uploads leave images.
 const UPLOADED: vk::ImageLayout = vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL;
+
+/// What is recorded.
+#[derive(Clone, Copy)]
+pub(crate) struct Recipe<'a> {
+    pub technique: &'a dyn Technique,
+    /// All of the technique's.
+    pub params: &'a Params,
+    /// Whether the frame is to be run from other views too.
+    pub moves: bool,
+}
 
 /// A scene on a device with a view of it: prepares techniques to run.
 pub struct Renderer {
@@ -151,48 +162,53 @@ impl Renderer {
     ) -> Result<Prepared, TechniqueError> {
         self.check(technique)?;
         self.check_tessellation(technique)?;
-        let params = &completed(technique, params);
-        let options = *params.typed::<DrawParams>();
-        let settings = &self.settings;
-        let view = self.view();
-        let mut draws = DrawList::new(&self.device, &self.scene, options)?;
-        draws.update(
-            &self.scene,
-            view.clip_from_world,
-            view.eye_ws,
-            settings.effects.tessellation.displacement_m(),
-        )?;
-        let blended =
-            BlendedList::of_view(&self.device, &self.scene, settings, &view, options.cull == Cull::Frustum)?;
-        let draws = (&draws, blended.as_ref());
-        let constants = self.device.create_buffer(&gpu::BufferDesc {
-            name: "frame constants",
-            bytes: size_of::<FrameConstants>() as u64,
-            usage: vk::BufferUsageFlags::UNIFORM_BUFFER,
-            memory: gpu::MemoryKind::Upload,
-        })?;
-        constants.write(0, bytemuck::bytes_of(&view.constants(settings, &self.lights, &self.scene)))?;
+        let recipe = Recipe { technique, params: &completed(technique, params), moves: false };
+        self.prepare_recipe(&recipe, &self.settings, also)
+    }
 
+    /// As [`Renderer::prepare`] for a camera that moves: what any view of the scene may need is recorded, so that [`Prepared::update`] can
+    /// show other views without a new plan.
+    ///
+    /// # Errors
+    /// As [`Renderer::prepare`].
+    pub fn prepare_moving(
+        &self,
+        technique: &dyn Technique,
+        params: &Params,
+        camera: &Camera,
+    ) -> Result<Prepared, TechniqueError> {
+        self.check(technique)?;
+        self.check_tessellation(technique)?;
+        let recipe = Recipe { technique, params: &completed(technique, params), moves: true };
+        let settings = Settings { camera: camera.clone(), ..self.settings.clone() };
+        self.prepare_recipe(&recipe, &settings, |_, _| {})
+    }
+
+    fn prepare_recipe(
+        &self,
+        recipe: &Recipe<'_>,
+        settings: &Settings,
+        also: impl Fn(&mut Graph, &ImageHandle),
+    ) -> Result<Prepared, TechniqueError> {
         let mut capacities = Capacities::default();
         for _ in 1..RECORDINGS_MAX {
-            let mut prepared =
-                self.record(technique, params, &view, draws, &constants, &capacities, &also)?;
-            if !capacities.is_watched() {
+            let mut prepared = self.record(recipe, settings, capacities, &also)?;
+            if !prepared.capacities.is_watched() {
                 return Ok(prepared);
             }
             // What the view needs is known after a frame of it.
             let mut counters = Vec::new();
-            for _ in 0..capacities.counting_frames() {
+            for _ in 0..prepared.capacities.counting_frames() {
                 prepared.run()?;
                 counters = capacity::most(counters, prepared.counters()?);
             }
-            match capacities.next(&counters) {
+            match prepared.capacities.next(&counters) {
                 Some(next) => capacities = next,
                 None => return Ok(prepared),
             }
         }
         // What it needs still grows: its counters tell what it drops.
-        self.record(technique, params, &view, draws, &constants, &capacities, &also)
+        self.record(recipe, settings, capacities, &also)
     }
 
     fn check(&self, technique: &dyn Technique) -> Result<(), TechniqueError> {
@@ -256,19 +272,30 @@ impl Renderer {
         Ok(())
     }
 
-    /// Records a frame with capacities for what can overflow.
-    #[expect(clippy::too_many_arguments, reason = "the parts of one frame")]
-    fn record(
+    /// Records a frame with capacities for what can overflow, and fills its inputs for the view of `settings`, whose all but the camera is
+    /// the renderer's.
+    pub(crate) fn record(
         &self,
-        technique: &dyn Technique,
-        params: &Params,
-        view: &CameraView,
-        (draws, blended): (&DrawList, Option<&BlendedList>),
-        constants: &gpu::Buffer,
-        capacities: &Capacities,
+        recipe: &Recipe<'_>,
+        settings: &Settings,
+        capacities: Capacities,
         also: &impl Fn(&mut Graph, &ImageHandle),
     ) -> Result<Prepared, TechniqueError> {
-        let settings = &self.settings;
+        let Recipe { technique, params, moves } = *recipe;
+        let camera = CameraView::fitted(settings, &self.scene);
+        let options = *params.typed::<DrawParams>();
+        let mut draws = DrawChoice::new(options);
+        draws.update(&self.scene, &camera, settings.effects.tessellation.displacement_m());
+        let view = View {
+            camera: &camera,
+            settings,
+            scene: &self.scene,
+            lights: &self.lights,
+            visible: &draws.visible,
+        };
+        let blended = BlendedList::of_view(&view, options.cull == Cull::Frustum, moves);
+
+        let inputs = ViewInputs::default();
         let mut graph = Graph::new();
         let mut frame = Frame {
             width_px: settings.width_px,
@@ -277,24 +304,26 @@ impl Renderer {
             params,
             scene: &self.scene,
             lights: &self.lights,
-            clip_from_world: view.clip_from_world,
-            eye_moved_m: view.eye_moved_m,
+            clip_from_world: camera.clip_from_world,
+            eye_moved_m: camera.eye_moved_m,
             background_radiance: background_radiance(settings).into(),
             view: &settings.view,
             tessellate_px: settings.effects.tessellation.edge_px,
             displacement_m: settings.effects.tessellation.displacement_m(),
-            buffers: self.import(&mut graph, constants, draws),
+            buffers: self.import(&mut graph, &inputs)?,
             shaders: &[&self.extra_shaders, technique.shaders(), &afterlight_stages::SHADERS],
             device: &self.device,
-            capacities,
+            capacities: &capacities,
             visible: &draws.visible,
+            inputs: &inputs,
+            moves,
             board: Board::default(),
         };
         indirect::record(&mut graph, &mut frame, settings)?;
         shadow::record(&mut graph, &mut frame, settings)?;
         let mut hdr = technique.record(&mut graph, &frame)?;
-        let depth_id = if settings.keep_depth { keep_depth(&mut graph, &frame) } else { None };
-        if let Some(blended) = blended {
+        let depth = if settings.keep_depth { keep_depth(&mut graph, &frame) } else { None };
+        if let Some(blended) = &blended {
             hdr = transparent::draw(&mut graph, &frame, blended, hdr)?;
         }
         also(&mut graph, &hdr);
@@ -306,29 +335,41 @@ impl Renderer {
         };
         let final_color =
             post::finish(&self.device, &mut graph, &frame, &shown, settings.effects.post.filter)?;
-        let final_id = graph.keep(&final_color);
+        let final_color = graph.keep(&final_color);
+        drop(frame);
         let plan = graph.plan(&self.device)?;
         let executor = Executor::new(&self.device, plan)?;
-        Ok(Prepared {
-            executor,
-            demands: capacities.demands(),
+        let kept = Kept {
             hdr: hdr_id.filter(|_| settings.keep_hdr),
-            depth: depth_id
-                .map(|depth| (depth, view.constants(settings, &self.lights, &self.scene).depth_to_distance)),
+            depth,
             light_pairs: hdr_id.filter(|_| counts_pairs),
-            samples: settings.samples,
-            final_color: final_id,
-            draw_calls: draws.visible.iter().map(|b| b.len() as u32).sum::<u32>()
-                + blended.map_or(0, |list| list.draw_count),
-            width_px: settings.width_px,
-            height_px: settings.height_px,
-        })
+            final_color,
+        };
+        let draw_calls = draws.count() + blended.as_ref().map_or(0, |list| list.draw_count);
+        let viewed = Viewed {
+            settings: settings.clone(),
+            scene: self.scene.clone(),
+            lights: self.lights.clone(),
+            camera,
+            draws,
+        };
+        Prepared::new(&self.device, executor, viewed, inputs, capacities, kept, draw_calls)
     }
 
-    fn import(&self, graph: &mut Graph, constants: &gpu::Buffer, draws: &DrawList) -> SceneBuffers {
+    fn import(&self, graph: &mut Graph, inputs: &ViewInputs) -> Result<SceneBuffers, TechniqueError> {
         let s = &self.scene;
-        SceneBuffers {
-            frame: graph.import_buffer("frame constants", BufferRole::Constants, constants),
+        let constants = inputs.declare(
+            &self.device,
+            graph,
+            ("frame constants", BufferRole::Constants),
+            size_of::<FrameConstants>() as u64,
+            vk::BufferUsageFlags::UNIFORM_BUFFER,
+            |view, bytes| put(bytes, 0, &[view.camera.constants(view.settings, view.lights, view.scene)]),
+        )?;
+        let draws =
+            inputs.declare_draws(&self.device, graph, "draw", s, |view| Cow::Borrowed(view.visible))?;
+        Ok(SceneBuffers {
+            frame: constants,
             draws: graph.import_buffer("scene draws", BufferRole::Scene, &s.draws),
             draw_data: graph.import_image("scene draw records", BufferRole::Scene, &s.draw_data, UPLOADED),
             materials: graph.import_image("scene materials", BufferRole::Scene, &s.materials, UPLOADED),
@@ -347,15 +388,15 @@ impl Renderer {
             positions: graph.import_buffer("scene positions", BufferRole::Scene, &s.positions),
             attributes: graph.import_buffer("scene attributes", BufferRole::Scene, &s.attributes),
             indices: graph.import_buffer("scene indices", BufferRole::Scene, &s.indices),
-            commands: graph.import_buffer("draw commands", BufferRole::Scene, &draws.commands),
-            command_counts: graph.import_buffer("draw counts", BufferRole::Scene, &draws.counts),
+            commands: draws.commands,
+            command_counts: draws.counts,
             volume: graph.import_buffer("light volume vertices", BufferRole::Lights, &self.volume),
             volume_indices: graph.import_buffer(
                 "light volume indices",
                 BufferRole::Lights,
                 &self.volume_indices,
             ),
-        }
+        })
     }
 }
 
@@ -381,110 +422,4 @@ fn check_size(device: &gpu::Device, settings: &Settings) -> Result<(), Technique
         }
     }
     Ok(())
-}
-
-/// Depth as the device has stored it.
-#[derive(Clone, Debug, PartialEq)]
-pub struct StoredDepth {
-    /// One a pixel, rows from the top; reversed, 0 where there is no surface.
-    pub values: Vec<f32>,
-    /// `[a, b, c, d]`: a depth z is at the view distance `(a z + b) / (c z + d)`, metres.
-    pub to_distance: [f32; 4],
-}
-
-/// A technique ready to run, as often as wanted.
-pub struct Prepared {
-    executor: Executor,
-    demands: Vec<Demand>,
-    hdr: Option<ResourceId>,
-    /// Depth of opaque surfaces, and how it becomes a view distance.
-    depth: Option<(ResourceId, [f32; 4])>,
-    /// Counts of pairs in the place of radiance.
-    light_pairs: Option<ResourceId>,
-    samples: u32,
-    final_color: ResourceId,
-    /// Draws in view.
-    pub draw_calls: u32,
-    width_px: u32,
-    height_px: u32,
-}
-
-impl Prepared {
-    /// Renders a frame and waits for it.
-    ///
-    /// # Errors
-    /// The device.
-    pub fn run(&mut self) -> Result<FrameReport, TechniqueError> {
-        Ok(self.executor.run()?)
-    }
-
-    /// The last frame, tone-mapped, sRGB, RGBA with 8 bits a channel, rows from the top.
-    ///
-    /// # Errors
-    /// The device.
-    pub fn final_rgba8(&mut self) -> Result<Vec<u8>, TechniqueError> {
-        Ok(self.executor.read_image(self.final_color)?)
-    }
-
-    /// The last frame's linear radiance, RGBA, rows from the top; `None` unless [`Settings::keep_hdr`] was set. In views of
-    /// [`views::LIGHT_PAIRS`] red is the pairs that a pixel tested, green those that are lit.
-    ///
-    /// # Errors
-    /// The device.
-    pub fn hdr_rgba(&mut self) -> Result<Option<Vec<f32>>, TechniqueError> {
-        let Some(bytes) = self.hdr_bytes()? else { return Ok(None) };
-        let scale = if self.light_pairs.is_some() { (1.0 / views::LIGHT_PAIR) as f32 } else { 1.0 };
-        let value = |half: &[u8]| half::f16::from_le_bytes([half[0], half[1]]).to_f32();
-        let of_pixel = |p: &[u8]| {
-            [scale * value(&p[..2]), scale * value(&p[2..4]), scale * value(&p[4..6]), value(&p[6..8])]
-        };
-        Ok(Some(bytes.chunks_exact(8).flat_map(of_pixel).collect()))
-    }
-
-    /// Pairs of a light and a surface that the last frame tested and lit; `None` unless [`Settings::view`] is one of
-    /// [`views::LIGHT_PAIRS`].
-    ///
-    /// # Errors
-    /// The device.
-    pub fn light_pairs(&mut self) -> Result<Option<LightPairs>, TechniqueError> {
-        let Some(counts) = self.light_pairs else { return Ok(None) };
-        Ok(Some(LightPairs::of(&self.executor.read_image(counts)?, self.samples)))
-    }
-
-    /// The last frame's linear radiance as it lies on the device, RGBA16F.
-    pub fn hdr_bytes(&mut self) -> Result<Option<Vec<u8>>, TechniqueError> {
-        Ok(self.hdr.map(|hdr| self.executor.read_image(hdr)).transpose()?)
-    }
-
-    /// Depth of the last frame's opaque surfaces. `None` unless [`Settings::keep_depth`] was set and the technique has drawn 32-bit depth at one
-    /// sample, in the size of the frame.
-    ///
-    /// # Errors
-    /// The device.
-    pub fn depth(&mut self) -> Result<Option<StoredDepth>, TechniqueError> {
-        let Some((depth, to_distance)) = self.depth else { return Ok(None) };
-        let bytes = self.executor.read_image(depth)?;
-        let values: Vec<f32> =
-            bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
-        let pixels = self.width_px as usize * self.height_px as usize;
-        Ok((bytes.len() == 4 * pixels).then_some(StoredDepth { values, to_distance }))
-    }
-
-    /// What the last frame counted of everything that can overflow: what it needed, what there was, what was dropped.
-    ///
-    /// # Errors
-    /// The device.
-    pub fn counters(&mut self) -> Result<Vec<Counter>, TechniqueError> {
-        self.demands.iter().map(|demand| demand.read(&self.executor)).collect()
-    }
-
-    /// Width and height in pixels.
-    pub fn size_px(&self) -> (u32, u32) {
-        (self.width_px, self.height_px)
-    }
-
-    /// The executor, for memory figures and buffers that were kept.
-    pub fn executor(&mut self) -> &mut Executor {
-        &mut self.executor
-    }
 }

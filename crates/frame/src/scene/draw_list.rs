@@ -7,7 +7,7 @@ use afterlight_scene::Aabb;
 use glam::{Mat4, Vec3, Vec4};
 
 use crate::{
-    Cull, DrawOrder, DrawParams,
+    CameraView, Cull, DrawOrder, DrawParams, put,
     scene::{BUCKETS, DrawInfo, SceneGpu},
 };
 
@@ -30,21 +30,82 @@ pub struct DrawCommand {
 /// Distance between commands in the buffer, bytes.
 pub const COMMAND_BYTES: u64 = size_of::<DrawCommand>() as u64;
 
+/// Draws in view, by bucket, in drawing order.
+#[derive(Clone, Debug, Default)]
+pub struct DrawChoice {
+    /// How draws are chosen and ordered.
+    pub options: DrawParams,
+    /// Draws in view, by bucket, in drawing order.
+    pub visible: [Vec<u32>; BUCKETS],
+    /// What they are sorted by, kept for its memory.
+    keyed: Vec<(f32, u32)>,
+}
+
+impl DrawChoice {
+    /// No draws.
+    pub fn new(options: DrawParams) -> Self {
+        Self { options, ..Self::default() }
+    }
+
+    /// Chooses and orders the draws for a view; surfaces may be displaced by `displacement_m` along each axis.
+    pub fn update(&mut self, scene: &SceneGpu, view: &CameraView, displacement_m: f32) {
+        let frustum = Frustum::new(view.clip_from_world);
+        let Self { options, visible, keyed } = self;
+        for (bucket, visible) in visible.iter_mut().enumerate() {
+            let (first, end) = (scene.bucket_first[bucket], scene.bucket_first[bucket + 1]);
+            let in_view = |draw: &u32| {
+                let bounds = &scene.draw_infos[*draw as usize].bounds_ws;
+                options.cull == Cull::None || frustum.touches(&displaced(bounds, displacement_m))
+            };
+            keyed.clear();
+            keyed.extend((first..end).filter(in_view).map(|draw| {
+                (options.order.key(&scene.draw_infos[draw as usize].bounds_ws, view.eye_ws), draw)
+            }));
+            if options.order != DrawOrder::Scene {
+                // Draws of one distance keep the scene's order, so that equal depths resolve alike in every technique.
+                keyed.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            }
+            visible.clear();
+            visible.extend(keyed.iter().map(|(_, draw)| *draw));
+        }
+    }
+
+    /// Number of draws in view.
+    pub fn count(&self) -> u32 {
+        self.visible.iter().map(|bucket| bucket.len() as u32).sum()
+    }
+}
+
+/// Writes the commands of draws, one range a bucket, into a buffer with room for every draw of the scene.
+pub fn write_commands(scene: &SceneGpu, visible: &[Vec<u32>; BUCKETS], bytes: &mut [u8]) {
+    for (bucket, visible) in visible.iter().enumerate() {
+        let first = scene.bucket_first[bucket] as usize;
+        for (place, draw) in (first..).zip(visible) {
+            let one = command(&scene.draw_infos[*draw as usize], *draw);
+            put(bytes, place * COMMAND_BYTES as usize, &[one]);
+        }
+    }
+}
+
+/// Writes the number of commands of each bucket, 32 bits each.
+pub fn write_counts(visible: &[Vec<u32>; BUCKETS], bytes: &mut [u8]) {
+    put(bytes, 0, &visible.each_ref().map(|bucket| bucket.len() as u32));
+}
+
 /// Indirect commands of a view, one range of the buffer a bucket, and their counts.
 pub struct DrawList {
     /// A [`DrawCommand`] a draw in view.
     pub commands: gpu::Buffer,
     /// Number of commands of each bucket, 32 bits each.
     pub counts: gpu::Buffer,
-    /// How draws are chosen and ordered.
-    pub options: DrawParams,
-    /// Draws in view, by bucket, in drawing order.
-    pub visible: [Vec<u32>; BUCKETS],
 }
 
 impl DrawList {
-    /// An empty list with room for every draw of a scene.
-    pub fn new(device: &gpu::Device, scene: &SceneGpu, options: DrawParams) -> Result<Self, gpu::GpuError> {
+    /// The draws of a choice.
+    ///
+    /// # Errors
+    /// The device.
+    pub fn new(device: &gpu::Device, scene: &SceneGpu, choice: &DrawChoice) -> Result<Self, gpu::GpuError> {
         let buffer = |name, bytes| {
             device.create_buffer(&gpu::BufferDesc {
                 name,
@@ -53,51 +114,13 @@ impl DrawList {
                 memory: gpu::MemoryKind::Upload,
             })
         };
-        Ok(Self {
+        let list = Self {
             commands: buffer("draw commands", COMMAND_BYTES * scene.draw_infos.len().max(1) as u64)?,
             counts: buffer("draw counts", 4 * BUCKETS as u64)?,
-            options,
-            visible: Default::default(),
-        })
-    }
-
-    /// Chooses and orders the draws for a view and writes the commands; surfaces may be displaced by `displacement_m` along
-    /// each axis.
-    pub fn update(
-        &mut self,
-        scene: &SceneGpu,
-        clip_from_world: Mat4,
-        eye_ws: Vec3,
-        displacement_m: f32,
-    ) -> Result<(), gpu::GpuError> {
-        let frustum = Frustum::new(clip_from_world);
-        let mut counts = [0u32; BUCKETS];
-        for (bucket, visible) in self.visible.iter_mut().enumerate() {
-            let (first, end) = (scene.bucket_first[bucket], scene.bucket_first[bucket + 1]);
-            let in_view = |draw: &u32| {
-                let bounds = &scene.draw_infos[*draw as usize].bounds_ws;
-                self.options.cull == Cull::None || frustum.touches(&displaced(bounds, displacement_m))
-            };
-            let mut keyed: Vec<(f32, u32)> = (first..end)
-                .filter(in_view)
-                .map(|draw| {
-                    (self.options.order.key(&scene.draw_infos[draw as usize].bounds_ws, eye_ws), draw)
-                })
-                .collect();
-            if self.options.order != DrawOrder::Scene {
-                // Draws of one distance keep the scene's order, so that equal depths resolve alike in every technique.
-                keyed.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-            }
-            visible.clear();
-            visible.extend(keyed.iter().map(|(_, draw)| *draw));
-            let commands: Vec<DrawCommand> =
-                visible.iter().map(|draw| command(&scene.draw_infos[*draw as usize], *draw)).collect();
-            counts[bucket] = commands.len() as u32;
-            if !commands.is_empty() {
-                self.commands.write(COMMAND_BYTES * u64::from(first), bytemuck::cast_slice(&commands))?;
-            }
-        }
-        self.counts.write(0, bytemuck::cast_slice(&counts))
+        };
+        list.commands.with_mapped_mut(|bytes| write_commands(scene, &choice.visible, bytes))?;
+        list.counts.with_mapped_mut(|bytes| write_counts(&choice.visible, bytes))?;
+        Ok(list)
     }
 }
 

@@ -12,10 +12,11 @@ mod raster;
 mod read_back;
 mod record;
 mod resources;
+mod slot;
 
 use std::time::Instant;
 
-use afterlight_gpu::{Device, vk};
+use afterlight_gpu::{self as gpu, Device, vk};
 
 use crate::error::GraphError;
 use crate::plan::Plan;
@@ -25,6 +26,7 @@ use commands::{BarrierList, BoundPass};
 use resources::{Physical, make_resources};
 
 pub use read_back::ResourceKey;
+pub use slot::{FrameSlot, FrameTimes};
 
 /// A plan with everything that it needs on a device.
 pub struct Executor {
@@ -67,6 +69,26 @@ impl Executor {
         &self.plan
     }
 
+    /// Records all passes.
+    fn record(&self, encoder: &mut gpu::Encoder) -> Result<Marks, gpu::GpuError> {
+        let mut times = Vec::with_capacity(self.passes.len() + 1);
+        let mut statistics = Vec::with_capacity(self.passes.len());
+        times.push(encoder.timestamp(vk::PipelineStageFlags2::ALL_COMMANDS)?);
+        for pass in &self.passes {
+            encoder.begin_label(&pass.name);
+            pass.barriers.record(encoder);
+            // A query spans the whole of a rendering scope: it may neither begin nor end within.
+            let query = encoder.begin_statistics()?;
+            pass.body.record(encoder)?;
+            encoder.end_statistics(query);
+            encoder.end_label();
+            times.push(encoder.timestamp(vk::PipelineStageFlags2::ALL_COMMANDS)?);
+            statistics.push(query);
+        }
+        self.final_barriers.record(encoder);
+        Ok(Marks { times, statistics })
+    }
+
     /// Records the frame, runs it, waits for it, and reports what it took.
     ///
     /// # Errors
@@ -74,21 +96,8 @@ impl Executor {
     pub fn run(&mut self) -> Result<FrameReport, GraphError> {
         let start = Instant::now();
         let mut encoder = self.device.encoder()?;
-        let mut times = Vec::with_capacity(self.passes.len() + 1);
-        let mut statistics = Vec::with_capacity(self.passes.len());
-        times.push(encoder.timestamp(vk::PipelineStageFlags2::ALL_COMMANDS)?);
-        for pass in &self.passes {
-            encoder.begin_label(&pass.name);
-            pass.barriers.record(&mut encoder);
-            // A query spans the whole of a rendering scope: it may neither begin nor end within.
-            let query = encoder.begin_statistics()?;
-            pass.body.record(&mut encoder)?;
-            encoder.end_statistics(query);
-            encoder.end_label();
-            times.push(encoder.timestamp(vk::PipelineStageFlags2::ALL_COMMANDS)?);
-            statistics.push(query);
-        }
-        self.final_barriers.record(&mut encoder);
+        slot::after_earlier_frames(&mut encoder);
+        let Marks { times, statistics } = self.record(&mut encoder)?;
         let recorded = Instant::now();
         let completed = self.device.submit(encoder)?;
         let done = Instant::now();
@@ -117,6 +126,13 @@ impl Executor {
             technique_bytes: self.plan.technique_bytes(),
         })
     }
+}
+
+/// Where the passes of a recorded frame begin and end, and what counts them.
+struct Marks {
+    /// The first pass begins at the first, each pass ends at the next.
+    times: Vec<gpu::TimestampId>,
+    statistics: Vec<gpu::StatisticsId>,
 }
 
 fn nanoseconds(duration: std::time::Duration) -> u64 {

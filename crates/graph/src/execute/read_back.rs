@@ -9,15 +9,15 @@ use crate::declare::ResourceId;
 use crate::error::GraphError;
 use crate::plan::{Plan, aspects};
 
-const ANY_WRITE: gpu::Access =
+pub(super) const ANY_WRITE: gpu::Access =
     gpu::Access { stages: vk::PipelineStageFlags2::ALL_COMMANDS, access: vk::AccessFlags2::MEMORY_WRITE };
-const ANY: gpu::Access = gpu::Access {
+pub(super) const ANY: gpu::Access = gpu::Access {
     stages: vk::PipelineStageFlags2::ALL_COMMANDS,
     access: vk::AccessFlags2::from_raw(
         vk::AccessFlags2::MEMORY_READ.as_raw() | vk::AccessFlags2::MEMORY_WRITE.as_raw(),
     ),
 };
-const COPY_READ: gpu::Access =
+pub(super) const COPY_READ: gpu::Access =
     gpu::Access { stages: vk::PipelineStageFlags2::ALL_TRANSFER, access: vk::AccessFlags2::TRANSFER_READ };
 
 /// Names a resource of a plan: by its name or by its id.
@@ -132,34 +132,68 @@ impl Executor {
     /// # Errors
     /// No such resource, one that is not kept or has several samples, or no memory.
     pub fn read_image(&self, key: impl ResourceKey) -> Result<Vec<u8>, GraphError> {
-        let id = self.find(&key)?;
+        let copy = self.image_copy(&key)?;
+        self.read_back(copy.bytes(), |encoder, target| {
+            copy.record(encoder, target, 0);
+            Ok(())
+        })
+    }
+
+    /// A copy of mip level 0 of a kept or imported image.
+    pub(super) fn image_copy(&self, key: &impl ResourceKey) -> Result<ImageCopy, GraphError> {
+        let id = self.find(key)?;
         let image = match &self.physical[id.0 as usize] {
             Physical::Image(image) => image,
-            _ => return Err(self.not_readable(&key, "a buffer", "an image")),
+            _ => return Err(self.not_readable(key, "a buffer", "an image")),
         };
         if image.samples() > 1 {
             return Err(self.not_readable(
-                &key,
+                key,
                 "an image of several samples",
                 "one sample (resolve it first)",
             ));
         }
         let Some(info) = gpu::format_info(image.format()) else {
-            return Err(self.not_readable(&key, "an image of a format of unknown size", "a known format"));
+            return Err(self.not_readable(key, "an image of a format of unknown size", "a known format"));
         };
         let planned = &self.plan.resources[id.0 as usize];
+        let mut layouts = Vec::new();
+        for layer in 0..image.layers() {
+            let layout =
+                planned.final_layouts.get((layer * image.mips()) as usize).copied().unwrap_or_default();
+            if layout == vk::ImageLayout::UNDEFINED {
+                return Err(self.not_readable(key, "a layer that no pass has written", "a written image"));
+            }
+            layouts.push(layout);
+        }
         let layer_bytes = info.level_bytes(image.extent()[0], image.extent()[1]);
+        Ok(ImageCopy { image: image.clone(), layouts, layer_bytes })
+    }
+}
+
+/// A copy of an image's mip level 0 to a buffer, after which the image is as it was.
+pub(super) struct ImageCopy {
+    image: gpu::Image,
+    /// The layout that each layer is in.
+    layouts: Vec<vk::ImageLayout>,
+    layer_bytes: u64,
+}
+
+impl ImageCopy {
+    /// Bytes that are copied.
+    pub(super) fn bytes(&self) -> u64 {
+        self.layer_bytes * self.layouts.len() as u64
+    }
+
+    /// Records the copy to `offset` bytes in `target`.
+    pub(super) fn record(&self, encoder: &mut gpu::Encoder, target: &gpu::Buffer, offset: u64) {
+        let image = &self.image;
         let full = aspects(image.format());
         let copied =
             if full.contains(vk::ImageAspectFlags::DEPTH) { vk::ImageAspectFlags::DEPTH } else { full };
         let mut barriers = Vec::new();
         let mut regions = Vec::new();
-        for layer in 0..image.layers() {
-            let layout =
-                planned.final_layouts.get((layer * image.mips()) as usize).copied().unwrap_or_default();
-            if layout == vk::ImageLayout::UNDEFINED {
-                return Err(self.not_readable(&key, "a layer that no pass has written", "a written image"));
-            }
+        for (layer, layout) in (0..).zip(&self.layouts) {
             barriers.push(gpu::ImageBarrier {
                 image,
                 range: vk::ImageSubresourceRange {
@@ -171,20 +205,18 @@ impl Executor {
                 },
                 before: ANY_WRITE,
                 after: COPY_READ,
-                old_layout: layout,
+                old_layout: *layout,
                 new_layout: vk::ImageLayout::TRANSFER_SRC_OPTIMAL,
             });
-            regions.push(image_to_buffer(image, copied, 0, layer, u64::from(layer) * layer_bytes));
+            let at = offset + u64::from(layer) * self.layer_bytes;
+            regions.push(image_to_buffer(image, copied, 0, layer, at));
         }
-        self.read_back(layer_bytes * u64::from(image.layers()), |encoder, target| {
-            encoder.barriers(&[], &[], &barriers);
-            encoder.copy_image_to_buffer(image, target, &regions);
-            for barrier in &mut barriers {
-                std::mem::swap(&mut barrier.old_layout, &mut barrier.new_layout);
-                (barrier.before, barrier.after) = (COPY_READ, ANY);
-            }
-            encoder.barriers(&[], &[], &barriers);
-            Ok(())
-        })
+        encoder.barriers(&[], &[], &barriers);
+        encoder.copy_image_to_buffer(image, target, &regions);
+        for barrier in &mut barriers {
+            std::mem::swap(&mut barrier.old_layout, &mut barrier.new_layout);
+            (barrier.before, barrier.after) = (COPY_READ, ANY);
+        }
+        encoder.barriers(&[], &[], &barriers);
     }
 }

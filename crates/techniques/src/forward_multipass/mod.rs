@@ -116,6 +116,9 @@ fn draw_lights(frame: &Frame<'_>, pass: &mut RasterPass<'_>) -> Result<(), Techn
             .blend(vec![Blend::ADD]);
     let whole = Rect { x_px: 0, y_px: 0, width_px: frame.width_px, height_px: frame.height_px };
     let by_light = frame.params.typed::<ForwardMultipassParams>().scissor == Scissor::Light;
+    if by_light {
+        frame.holds_for_this_view();
+    }
     for index in 0..frame.lights.count {
         if index > 0 && index % STENCIL_REFERENCES == 0 {
             pass.clear_stencil(0, None);

@@ -264,6 +264,9 @@ fn empty_lists(
 
 /// Specialization constants of shaders that build the lists.
 fn build_constants(frame: &Frame<'_>, layout: &Layout, filter: &FilterParams) -> Vec<(String, u32)> {
+    if frame.eye_moved_m != 0.0 {
+        frame.holds_for_this_view();
+    }
     let mut all = filter::constants(filter, frame.eye_moved_m);
     all.extend(layout.constants().map(|(name, value)| (name.to_owned(), value)));
     all.push(("SAMPLES".to_owned(), layout.samples));

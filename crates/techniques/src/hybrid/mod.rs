@@ -139,6 +139,7 @@ impl Technique for Hybrid {
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let HybridParams { path, prepass_weight } = *frame.params.typed();
+        frame.holds_for_this_view();
         let runs = match path {
             PathChoice::Deferred => paths::one_path(frame, Path::Deferred),
             PathChoice::Prepass => paths::one_path(frame, Path::Prepass),

@@ -3,8 +3,7 @@
 
 use afterlight_graph::{
     Blend, BlendEquation, BufferHandle, BufferRole, DepthTest, DrawCall, Graph, ImageHandle, Load, PassRole,
-    RasterPass,
-    gpu::{self, vk},
+    RasterPass, gpu::vk,
 };
 
 use crate::{
@@ -12,8 +11,8 @@ use crate::{
     surfaces::{geometry::SceneDraws, shade},
 };
 use afterlight_frame::{
-    CameraView, Frame, OpaqueDepth, SceneGpu, Settings, TechniqueError, Transparency, VisitsAllLights,
-    scene::blended::ViewOrder,
+    Frame, OpaqueDepth, SceneGpu, Settings, TechniqueError, Transparency, View, VisitsAllLights, put,
+    scene::blended::{Ordered, ViewOrder},
     scene::{Bucket, draw_list::COMMAND_BYTES},
     views,
 };
@@ -39,68 +38,64 @@ pub fn warning(settings: &Settings, scene: &SceneGpu) -> Option<String> {
     })
 }
 
-/// The triangles with alpha blending that a view needs, in drawing order.
+/// The triangles with alpha blending that a view needs: how many there are, or may be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BlendedList {
-    indices: gpu::Buffer,
-    commands: gpu::Buffer,
-    /// One word: the number of commands.
-    count: gpu::Buffer,
-    command_count: u32,
+    index_count: usize,
+    command_count: usize,
     /// Draws in view.
     pub draw_count: u32,
+    /// Whether draws outside of the view are left out.
+    cull: bool,
 }
 
 impl BlendedList {
-    /// Sorts them for a view; `None` where there are none in it, or the settings ask for none.
-    ///
-    /// # Errors
-    /// The device.
-    pub fn of_view(
-        device: &gpu::Device,
-        scene: &SceneGpu,
-        settings: &Settings,
-        view: &CameraView,
-        cull: bool,
-    ) -> Result<Option<Self>, gpu::GpuError> {
-        if !is_drawn(settings, scene) {
-            return Ok(None);
+    /// Those of a view; `None` where there are none in it, or the settings ask for none. If the frame `moves`, there is room for every
+    /// triangle of the scene.
+    pub fn of_view(view: &View<'_>, cull: bool, moves: bool) -> Option<Self> {
+        if !is_drawn(view.settings, view.scene) {
+            return None;
         }
-        let ordered = scene.blended.order(&ViewOrder {
-            cull: cull.then_some(view.clip_from_world),
-            distance_from_world: view.distance_from_world(),
-            displacement_m: settings.effects.tessellation.displacement_m(),
-            triangles_max: SORTED_TRIANGLES_MAX,
-        });
-        if ordered.commands.is_empty() {
-            return Ok(None);
+        let Ordered { indices, commands, draw_count } = ordered(view, cull);
+        if moves {
+            let triangles = view.scene.blended.triangle_count();
+            // A run of triangles of one draw is a command.
+            let runs =
+                if triangles > SORTED_TRIANGLES_MAX { view.scene.blended.draw_count() } else { triangles };
+            return Some(Self { index_count: 3 * triangles, command_count: runs, draw_count, cull });
         }
-        let buffer = |name, usage, bytes: &[u8]| {
-            let memory = gpu::MemoryKind::Upload;
-            let buffer =
-                device.create_buffer(&gpu::BufferDesc { name, bytes: bytes.len() as u64, usage, memory })?;
-            buffer.write(0, bytes)?;
-            Ok::<_, gpu::GpuError>(buffer)
-        };
-        Ok(Some(Self {
-            indices: buffer(
-                "blended indices",
-                vk::BufferUsageFlags::INDEX_BUFFER,
-                bytemuck::cast_slice(&ordered.indices),
-            )?,
-            commands: buffer(
-                "blended draw commands",
-                vk::BufferUsageFlags::INDIRECT_BUFFER,
-                bytemuck::cast_slice(&ordered.commands),
-            )?,
-            count: buffer(
-                "blended draw count",
-                vk::BufferUsageFlags::INDIRECT_BUFFER,
-                bytemuck::bytes_of(&(ordered.commands.len() as u32)),
-            )?,
-            command_count: ordered.commands.len() as u32,
-            draw_count: ordered.draw_count,
-        }))
+        let (index_count, command_count) = (indices.len(), commands.len());
+        (command_count > 0).then_some(Self { index_count, command_count, draw_count, cull })
     }
+
+    /// Where the commands begin, and their count, in the one buffer that holds indices, commands and count, bytes.
+    fn offsets(&self) -> [u64; 2] {
+        let commands = 4 * self.index_count as u64;
+        [commands, commands + COMMAND_BYTES * self.command_count as u64]
+    }
+
+    /// The buffer, filled for each view.
+    fn declare(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<BufferHandle, TechniqueError> {
+        let usage = vk::BufferUsageFlags::INDEX_BUFFER | vk::BufferUsageFlags::INDIRECT_BUFFER;
+        let ([commands_at, count_at], cull) = (self.offsets(), self.cull);
+        let name = ("blended triangles", BufferRole::Scene);
+        frame.of_view(graph, name, count_at + 4, usage, move |view, bytes| {
+            let Ordered { indices, commands, .. } = ordered(view, cull);
+            put(bytes, 0, &indices);
+            put(bytes, commands_at as usize, &commands);
+            put(bytes, count_at as usize, &[commands.len() as u32]);
+        })
+    }
+}
+
+/// Sorts the triangles for a view.
+fn ordered(view: &View<'_>, cull: bool) -> Ordered {
+    view.scene.blended.order(&ViewOrder {
+        cull: cull.then_some(view.camera.clip_from_world),
+        distance_from_world: view.camera.distance_from_world(),
+        displacement_m: view.settings.effects.tessellation.displacement_m(),
+        triangles_max: SORTED_TRIANGLES_MAX,
+    })
 }
 
 /// Declares the passes that draw blended surfaces over the opaque radiance `hdr` of a technique; returns its next version. Where the board
@@ -126,10 +121,9 @@ pub fn draw(
     };
     let drawn = BlendedDraws {
         lights,
-        indices: graph.import_buffer("blended indices", BufferRole::Scene, &list.indices),
-        commands: graph.import_buffer("blended draw commands", BufferRole::Scene, &list.commands),
-        count: graph.import_buffer("blended draw count", BufferRole::Scene, &list.count),
-        max: list.command_count,
+        triangles: list.declare(graph, frame)?,
+        offsets: list.offsets(),
+        max: list.command_count as u32,
     };
     if frame.samples == 1 {
         let mut pass = graph.raster("shared/transparent", PassRole::Transparency);
@@ -184,9 +178,10 @@ fn opaque_depth(graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, Tec
 /// A sorted list as the graph knows it, and how its surfaces find their lights.
 struct BlendedDraws {
     lights: LightStep,
-    indices: BufferHandle,
-    commands: BufferHandle,
-    count: BufferHandle,
+    /// Indices, then commands, then their count.
+    triangles: BufferHandle,
+    /// Where commands and count begin, bytes.
+    offsets: [u64; 2],
     max: u32,
 }
 
@@ -200,15 +195,15 @@ impl BlendedDraws {
         self.lights.bind(frame, pass);
         // With a count on the device, as all draws of a frame: after such calls, one without drew nothing on lavapipe.
         let call = DrawCall::IndexedIndirectCount {
-            buffer: &self.commands,
-            offset: 0,
-            count_buffer: &self.count,
-            count_offset: 0,
+            buffer: &self.triangles,
+            offset: self.offsets[0],
+            count_buffer: &self.triangles,
+            count_offset: self.offsets[1],
             max: self.max,
             stride: COMMAND_BYTES as u32,
         };
         let draw = surfaces.bucket_draw(frame, Bucket::DOUBLE_SIDED, call);
-        pass.draw(draw.index_buffer(&self.indices, vk::IndexType::UINT32));
+        pass.draw(draw.index_buffer(&self.triangles, vk::IndexType::UINT32));
         Ok(())
     }
 }

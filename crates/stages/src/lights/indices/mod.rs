@@ -90,12 +90,10 @@ pub fn build(
         graph.image(&name, BufferRole::Lights, frame.image_info(vk::Format::R16G16B16A16_SFLOAT))
     };
     let cleared: Vec<ImageHandle> = (0..count).map(image).collect();
-    let order = frame.table(
-        graph,
-        "light order",
-        BufferRole::Lights,
-        &far_to_near(frame.lights, frame.clip_from_world),
-    )?;
+    let order =
+        frame.table_of_view(graph, ("light order", BufferRole::Lights), bounded as usize, |view| {
+            far_to_near(view.lights, view.camera.clip_from_world)
+        })?;
 
     let mut pass = graph.raster(&format!("{}/indices", technique), PassRole::LightAssignment);
     frame.bind_scene(&mut pass);

@@ -11,7 +11,8 @@ use afterlight_scene::{Aabb, Camera, Light, LightKind, Projection};
 use glam::{Mat4, Vec3};
 
 use afterlight_frame::{
-    CameraView, DrawParams, Frame, SceneGpu, Settings, TechniqueError, scene::draw_list::DrawList,
+    CameraView, DrawParams, Frame, SceneGpu, Settings, TechniqueError,
+    scene::draw_list::{DrawChoice, DrawList},
 };
 
 /// Widest angle of a light's perspective view, radians: further out a texel has hardly any solid angle.
@@ -137,13 +138,9 @@ pub fn look_through<T>(
     let settings =
         Settings { camera: source.camera.clone(), width_px: size_px, height_px: size_px, ..settings.clone() };
     let view = CameraView::new(&settings);
-    let mut draws = DrawList::new(frame.device, frame.scene, DrawParams::default())?;
-    draws.update(
-        frame.scene,
-        view.clip_from_world,
-        view.eye_ws,
-        settings.effects.tessellation.displacement_m(),
-    )?;
+    let mut choice = DrawChoice::new(DrawParams::default());
+    choice.update(frame.scene, &view, settings.effects.tessellation.displacement_m());
+    let draws = DrawList::new(frame.device, frame.scene, &choice)?;
     let name = format!("{pass} view");
     let constants = upload(frame.device, &name, &view.constants(&settings, frame.lights, frame.scene))?;
     let imported = [

@@ -1,0 +1,226 @@
+//! A frame in flight: recorded once, submitted many times, never waited for unless its own last submission still runs.
+//!
+//! All frames run on one queue, one after another, and share the plan's images and buffers. What a frame holds for itself is what the host
+//! writes before it and reads after it: inputs and outputs.
+
+use afterlight_gpu::{self as gpu, Device, GpuError, vk};
+
+use super::read_back::{ANY, ANY_WRITE, COPY_READ, ImageCopy};
+use super::{Executor, Marks};
+use crate::declare::ResourceId;
+use crate::error::GraphError;
+use crate::execute::resources::Physical;
+
+/// Copies of buffers begin at multiples of this, bytes.
+const COPY_ALIGNMENT: u64 = 16;
+
+/// Where something lies in a buffer that the host reaches, bytes.
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    offset: u64,
+    bytes: u64,
+}
+
+/// Places one after another.
+#[derive(Default)]
+struct Places {
+    all: Vec<Place>,
+    bytes: u64,
+}
+
+impl Places {
+    fn push(&mut self, bytes: u64) -> Place {
+        let place = Place { offset: self.bytes.next_multiple_of(COPY_ALIGNMENT), bytes };
+        self.bytes = place.offset + bytes;
+        self.all.push(place);
+        place
+    }
+
+    fn buffer(
+        &self,
+        device: &Device,
+        name: &str,
+        memory: gpu::MemoryKind,
+    ) -> Result<Option<gpu::Buffer>, GpuError> {
+        let usage = vk::BufferUsageFlags::TRANSFER_SRC | vk::BufferUsageFlags::TRANSFER_DST;
+        let desc = gpu::BufferDesc { name, bytes: self.bytes, usage, memory };
+        (self.bytes > 0).then(|| device.create_buffer(&desc)).transpose()
+    }
+}
+
+/// When the device worked on a frame, nanoseconds by its own clock, and how long the passes took. All empty or `None` where it has no
+/// timestamps.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FrameTimes {
+    /// When it began, inputs included.
+    pub start_ns: Option<f64>,
+    /// When it was done, outputs included.
+    pub end_ns: Option<f64>,
+    /// From the first pass to the last, as [`FrameReport::frame_ns`](crate::FrameReport::frame_ns).
+    pub frame_ns: Option<f64>,
+    /// A time a pass, in the order of the plan.
+    pub pass_ns: Vec<f64>,
+}
+
+/// A frame of an [`Executor`] that waits for its next submission, or is in flight.
+pub struct FrameSlot {
+    recording: gpu::Recording,
+    marks: Marks,
+    start: gpu::TimestampId,
+    end: gpu::TimestampId,
+    written: Option<gpu::Buffer>,
+    inputs: Vec<Place>,
+    read: Option<gpu::Buffer>,
+    outputs: Vec<Place>,
+    completed: gpu::Completed,
+    times: FrameTimes,
+}
+
+impl Executor {
+    /// Records a frame to be submitted many times. Before its first pass `inputs` are overwritten by what [`FrameSlot::write`] was given
+    /// last; after its last pass kept or imported resources, the `outputs`, are copied to where [`FrameSlot::read`] finds them.
+    ///
+    /// # Errors
+    /// An output that [`Executor::read_image`] or [`Executor::read_buffer`] would refuse, no memory, a recording that the device refuses.
+    pub fn slot(&self, inputs: &[gpu::Buffer], outputs: &[ResourceId]) -> Result<FrameSlot, GraphError> {
+        let mut places = Places::default();
+        inputs.iter().for_each(|input| {
+            places.push(input.bytes());
+        });
+        let written = places.buffer(&self.device, "frame inputs", gpu::MemoryKind::Upload)?;
+        let inputs_at = places.all;
+
+        let mut places = Places::default();
+        let mut copies = Vec::with_capacity(outputs.len());
+        for id in outputs {
+            let copy = match &self.physical[self.find(id)?.0 as usize] {
+                Physical::Image(_) => Copied::Image(self.image_copy(id)?),
+                _ => Copied::Buffer(self.buffer(*id)?.clone()),
+            };
+            let place = places.push(copy.bytes());
+            copies.push((copy, place));
+        }
+        let read = places.buffer(&self.device, "frame outputs", gpu::MemoryKind::Readback)?;
+
+        let mut encoder = self.device.encoder_for_many()?;
+        after_earlier_frames(&mut encoder);
+        let start = encoder.timestamp(vk::PipelineStageFlags2::ALL_COMMANDS)?;
+        if let Some(written) = &written {
+            for (input, place) in inputs.iter().zip(&inputs_at) {
+                encoder.copy_buffer(written, place.offset, input, 0, place.bytes)?;
+            }
+            encoder.barriers(&[gpu::MemoryBarrier { before: ANY_WRITE, after: ANY }], &[], &[]);
+        }
+        let marks = self.record(&mut encoder)?;
+        if let Some(read) = &read {
+            encoder.barriers(&[gpu::MemoryBarrier { before: ANY_WRITE, after: COPY_READ }], &[], &[]);
+            for (copy, place) in &copies {
+                match copy {
+                    Copied::Buffer(buffer) => {
+                        encoder.copy_buffer(buffer, 0, read, place.offset, place.bytes)?
+                    }
+                    Copied::Image(copy) => copy.record(&mut encoder, read, place.offset),
+                }
+            }
+        }
+        let end = encoder.timestamp(vk::PipelineStageFlags2::ALL_COMMANDS)?;
+        Ok(FrameSlot {
+            recording: encoder.finish()?,
+            marks,
+            start,
+            end,
+            written,
+            inputs: inputs_at,
+            read,
+            outputs: places.all,
+            completed: gpu::Completed::default(),
+            times: FrameTimes::default(),
+        })
+    }
+}
+
+/// What is copied at the end of a frame.
+enum Copied {
+    Buffer(gpu::Buffer),
+    Image(ImageCopy),
+}
+
+impl Copied {
+    fn bytes(&self) -> u64 {
+        match self {
+            Copied::Buffer(buffer) => buffer.bytes(),
+            Copied::Image(copy) => copy.bytes(),
+        }
+    }
+}
+
+/// Frames share their memory: the next one begins where the last has ended.
+pub(super) fn after_earlier_frames(encoder: &mut gpu::Encoder) {
+    encoder.barriers(&[gpu::MemoryBarrier { before: ANY, after: ANY }], &[], &[]);
+}
+
+impl FrameSlot {
+    /// Lets `write` fill input number `input`, as long as its buffer; waits for the slot's last submission. What is not written stays as
+    /// the slot had it last.
+    ///
+    /// # Errors
+    /// The device was lost.
+    pub fn write(&mut self, input: usize, write: impl FnOnce(&mut [u8])) -> Result<(), GraphError> {
+        self.recording.wait()?;
+        let place = self.inputs[input];
+        let Some(written) = &self.written else { return Ok(()) };
+        let [from, end] = [place.offset, place.offset + place.bytes].map(|at| at as usize);
+        Ok(written.with_mapped_mut(|bytes| write(&mut bytes[from..end]))?)
+    }
+
+    /// Submits the frame and returns at once; only its own last submission is waited for.
+    ///
+    /// # Errors
+    /// The device was lost.
+    pub fn submit(&mut self) -> Result<(), GraphError> {
+        Ok(self.recording.submit()?)
+    }
+
+    /// Whether the device has nothing of the frame left to do.
+    ///
+    /// # Errors
+    /// The device was lost.
+    pub fn is_done(&self) -> Result<bool, GraphError> {
+        Ok(self.recording.is_done()?)
+    }
+
+    /// Waits for the last submission and returns its times.
+    ///
+    /// # Errors
+    /// The device was lost.
+    pub fn finish(&mut self) -> Result<&FrameTimes, GraphError> {
+        self.recording.collect(&mut self.completed)?;
+        let (completed, times) = (&self.completed, &self.marks.times);
+        self.times.start_ns = completed.ns(self.start);
+        let whole_ns = completed.elapsed_ns(self.start, self.end);
+        self.times.end_ns = self.times.start_ns.zip(whole_ns).map(|(start_ns, whole_ns)| start_ns + whole_ns);
+        self.times.frame_ns = completed.elapsed_ns(times[0], times[times.len() - 1]);
+        self.times.pass_ns.clear();
+        self.times.pass_ns.extend(times.windows(2).filter_map(|pair| completed.elapsed_ns(pair[0], pair[1])));
+        Ok(&self.times)
+    }
+
+    /// Lets `read` see output number `output` of the last submission, which is waited for.
+    ///
+    /// # Errors
+    /// The device was lost.
+    pub fn read<T>(&mut self, output: usize, read: impl FnOnce(&[u8]) -> T) -> Result<T, GraphError> {
+        self.recording.wait()?;
+        let place = self.outputs[output];
+        let [from, end] = [place.offset, place.offset + place.bytes].map(|at| at as usize);
+        match &self.read {
+            Some(buffer) => Ok(buffer.with_mapped_mut(|bytes| read(&bytes[from..end]))?),
+            None => Ok(read(&[])),
+        }
+    }
+
+    /// Bytes that the slot holds beside the plan, which all slots share.
+    pub fn bytes(&self) -> u64 {
+        [&self.written, &self.read].into_iter().flatten().map(gpu::Buffer::allocated_bytes).sum()
+    }
+}

@@ -1,0 +1,316 @@
+//! Frames in flight: a camera that moves, several frames on their way at once, nobody waits.
+//!
+//! A frame's inputs are written into memory of its own and copied by the device, so that the host can prepare the next frame while the device
+//! draws this one. All frames share the plan's images and buffers, since the device draws one after another.
+
+use std::{
+    collections::VecDeque,
+    sync::Arc,
+    time::{Duration, Instant},
+};
+
+use afterlight_graph::{FrameSlot, FrameTimes, ResourceId};
+use afterlight_scene::Camera;
+
+use crate::{Prepared, Renderer, renderer::Recipe};
+use afterlight_frame::{
+    Params, Settings, Technique, TechniqueError,
+    capacity::{Capacities, Demand, Shortage},
+    completed,
+};
+
+/// Times that a frame is drawn again at most until everything that can overflow has room.
+const DRAWN_AGAIN_MAX: u32 = 8;
+
+/// What a flight does with a frame that fell short of room.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Shortfall {
+    /// Draws it again with room before it is handed on.
+    DrawAgain,
+    /// Hands it on with what it dropped; later frames have room.
+    Tell,
+}
+
+/// How frames fly.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FlightOptions {
+    /// Frames on their way at once, at least 1.
+    pub in_flight: u32,
+    /// What is done with a frame that fell short of room.
+    pub shortfall: Shortfall,
+    /// Whether pictures are copied to where the host can read them.
+    pub pictures: bool,
+}
+
+impl Default for FlightOptions {
+    fn default() -> Self {
+        Self { in_flight: 3, shortfall: Shortfall::DrawAgain, pictures: false }
+    }
+}
+
+/// What a frame is given: all that may change without a new plan.
+#[derive(Clone, Debug)]
+pub struct FrameContext {
+    /// Number of the frame.
+    pub index: u64,
+    /// Time of the scene, seconds.
+    pub time_s: f64,
+    /// The camera.
+    pub camera: Camera,
+}
+
+/// Something that costs a frame more than its neighbours.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Event {
+    /// The technique records what holds for one view alone, so the frame was planned anew.
+    Planned,
+    /// A list had no room for what the frame needed, or hardly any: it grows.
+    Grown(Shortage),
+    /// The frame was drawn again, with room.
+    DrawnAgain,
+}
+
+/// A frame that is done.
+pub struct Done<'a> {
+    /// Its number.
+    pub index: u64,
+    /// When the device worked on it.
+    pub times: &'a FrameTimes,
+    /// Time of the host's thread that it took, waiting for the device left out.
+    pub cpu: Duration,
+    /// What cost it more than its neighbours.
+    pub events: &'a [Event],
+    /// Whether it dropped something for want of room ([`Shortfall::Tell`]; or a bound that the user fixed).
+    pub fell_short: bool,
+    /// The picture, as [`Prepared::final_rgba8`], where the options ask for it.
+    pub rgba8: Option<&'a [u8]>,
+}
+
+/// A frame's place: recorded for one plan, and perhaps on its way.
+struct Place {
+    slot: FrameSlot,
+    /// The plan that it is recorded for.
+    plan: u64,
+    /// Lists that can overflow, each an output of the slot.
+    demands: Arc<[Demand]>,
+    flying: Option<Flying>,
+}
+
+struct Flying {
+    context: FrameContext,
+    cpu: Duration,
+    events: Vec<Event>,
+}
+
+/// A technique that draws frame after frame.
+pub struct Flight<'r> {
+    renderer: &'r Renderer,
+    technique: &'r dyn Technique,
+    params: Params,
+    options: FlightOptions,
+    prepared: Prepared,
+    /// Counts the plans so far.
+    plan: u64,
+    demands: Arc<[Demand]>,
+    /// In the order of their frames, the oldest first.
+    places: VecDeque<Place>,
+}
+
+impl Renderer {
+    /// Prepares a technique for frames in flight, the first of them through `camera`.
+    ///
+    /// # Errors
+    /// As [`Renderer::prepare`].
+    pub fn fly<'r>(
+        &'r self,
+        technique: &'r dyn Technique,
+        params: &Params,
+        camera: &Camera,
+        options: FlightOptions,
+    ) -> Result<Flight<'r>, TechniqueError> {
+        let prepared = self.prepare_moving(technique, params, camera)?;
+        Ok(Flight {
+            renderer: self,
+            technique,
+            params: completed(technique, params),
+            options,
+            plan: 0,
+            demands: prepared.demands.clone().into(),
+            prepared,
+            places: VecDeque::new(),
+        })
+    }
+}
+
+impl Flight<'_> {
+    /// Sends a frame on its way. Frames that are done by now are handed to `done` first, in their order; if as many as the options allow are
+    /// on their way, the oldest is waited for.
+    ///
+    /// # Errors
+    /// The device, a plan that is larger than its memory; those of `done`.
+    pub fn frame(
+        &mut self,
+        context: FrameContext,
+        done: &mut dyn FnMut(&Done<'_>) -> Result<(), TechniqueError>,
+    ) -> Result<(), TechniqueError> {
+        self.hand_on(self.options.in_flight.max(1) as usize - 1, done)?;
+        let start = Instant::now();
+        let mut events = Vec::new();
+        if self.prepared.shows_all_views {
+            self.prepared.viewed.look_through(&context.camera);
+        } else {
+            self.plan_anew(&context.camera, self.prepared.capacities.again())?;
+            events.push(Event::Planned);
+        }
+        let place = self.launch()?;
+        let flying = Flying { context, cpu: start.elapsed(), events };
+        self.places.push_back(Place { flying: Some(flying), ..place });
+        Ok(())
+    }
+
+    /// Waits for all frames on their way and hands them to `done`.
+    ///
+    /// # Errors
+    /// As [`Self::frame`].
+    pub fn land(
+        &mut self,
+        done: &mut dyn FnMut(&Done<'_>) -> Result<(), TechniqueError>,
+    ) -> Result<(), TechniqueError> {
+        self.hand_on(0, done)
+    }
+
+    /// Bytes of the plan, and those that frames in flight hold for themselves.
+    pub fn bytes(&self) -> (u64, u64) {
+        (self.prepared.executor.plan().peak_bytes(), self.places.iter().map(|place| place.slot.bytes()).sum())
+    }
+
+    /// Names of the passes, in the order of [`FrameTimes::pass_ns`].
+    pub fn pass_names(&self) -> Vec<String> {
+        self.prepared.executor.plan().passes.iter().map(|pass| pass.name.clone()).collect()
+    }
+
+    /// Submits a frame of the current view.
+    fn launch(&mut self) -> Result<Place, TechniqueError> {
+        // A place whose frame was handed on stands at the front.
+        let idle = self.places.iter().position(|place| place.flying.is_none() && place.plan == self.plan);
+        let mut place = match idle.and_then(|idle| self.places.remove(idle)) {
+            Some(place) => place,
+            None => {
+                // Places of older plans are of no use.
+                self.places.retain(|place| place.flying.is_some());
+                Place { slot: self.slot()?, plan: self.plan, demands: self.demands.clone(), flying: None }
+            }
+        };
+        let view = self.prepared.viewed.view();
+        for (i, input) in self.prepared.inputs.iter().enumerate() {
+            place.slot.write(i, |bytes| input.fill(&view, bytes))?;
+        }
+        place.slot.submit()?;
+        Ok(place)
+    }
+
+    fn slot(&self) -> Result<FrameSlot, TechniqueError> {
+        let inputs: Vec<_> = self.prepared.inputs.iter().map(|input| input.buffer.clone()).collect();
+        Ok(self.prepared.executor.slot(&inputs, &self.outputs())?)
+    }
+
+    /// What is read after each frame: a counter a list, then the picture.
+    fn outputs(&self) -> Vec<ResourceId> {
+        let counters = self.demands.iter().map(Demand::resource);
+        counters.chain(self.options.pictures.then_some(self.prepared.kept.final_color)).collect()
+    }
+
+    fn plan_anew(&mut self, camera: &Camera, capacities: Capacities) -> Result<(), TechniqueError> {
+        let settings = Settings { camera: camera.clone(), ..self.renderer.settings().clone() };
+        let recipe = Recipe { technique: self.technique, params: &self.params, moves: true };
+        self.prepared = self.renderer.record(&recipe, &settings, capacities, &|_, _| {})?;
+        self.demands = self.prepared.demands.clone().into();
+        self.plan += 1;
+        Ok(())
+    }
+
+    /// Hands frames that are done to `done`, the oldest first, and waits until no more than `left` are on their way.
+    fn hand_on(
+        &mut self,
+        left: usize,
+        done: &mut dyn FnMut(&Done<'_>) -> Result<(), TechniqueError>,
+    ) -> Result<(), TechniqueError> {
+        loop {
+            let flying = self.places.iter().filter(|place| place.flying.is_some()).count();
+            let Some(oldest) = self.places.iter().position(|place| place.flying.is_some()) else {
+                return Ok(());
+            };
+            if flying <= left && !self.places[oldest].slot.is_done()? {
+                return Ok(());
+            }
+            let Some(mut place) = self.places.remove(oldest) else { return Ok(()) };
+            let Some(mut flying) = place.flying.take() else { return Ok(()) };
+            place.slot.finish()?;
+            let start = Instant::now();
+            let fell_short = self.make_room(&mut place, &mut flying)?;
+            flying.cpu += start.elapsed();
+            let times = place.slot.finish()?.clone();
+            let picture = self.options.pictures.then_some(place.demands.len());
+            let mut tell = |rgba8: Option<&[u8]>| {
+                done(&Done {
+                    index: flying.context.index,
+                    times: &times,
+                    cpu: flying.cpu,
+                    events: &flying.events,
+                    fell_short,
+                    rgba8,
+                })
+            };
+            match picture {
+                Some(output) => place.slot.read(output, |bytes| tell(Some(bytes)))??,
+                None => tell(None)?,
+            }
+            if place.plan == self.plan {
+                self.places.push_front(place);
+            }
+        }
+    }
+
+    /// Gives lists that had no room for what a frame needed, or hardly any, more of it, and draws the frame again where something was dropped
+    /// and the options say so. Returns whether the frame that `place` now holds dropped something.
+    fn make_room(&mut self, place: &mut Place, flying: &mut Flying) -> Result<bool, TechniqueError> {
+        for again in 0..=DRAWN_AGAIN_MAX {
+            let shortages = place.shortages()?;
+            let fell_short = shortages.iter().any(Shortage::is_felt);
+            let mut growing = shortages.iter().filter(|shortage| !shortage.fixed).peekable();
+            if growing.peek().is_none() || again == DRAWN_AGAIN_MAX {
+                return Ok(fell_short);
+            }
+            flying.events.extend(growing.map(|shortage| Event::Grown(shortage.clone())));
+            let now = self.prepared.viewed.settings.camera.clone();
+            let is_drawn_again = fell_short && self.options.shortfall == Shortfall::DrawAgain;
+            let camera = if is_drawn_again { &flying.context.camera } else { &now };
+            // A frame before this one may have made room already.
+            if self.prepared.capacities.lack(&shortages) {
+                self.plan_anew(camera, self.prepared.capacities.grown(&shortages))?;
+            } else if is_drawn_again && !self.prepared.shows_all_views {
+                self.plan_anew(camera, self.prepared.capacities.again())?;
+            }
+            if !is_drawn_again {
+                return Ok(fell_short);
+            }
+            flying.events.push(Event::DrawnAgain);
+            self.prepared.viewed.look_through(camera);
+            *place = self.launch()?;
+            place.slot.finish()?;
+            self.prepared.viewed.look_through(&now);
+        }
+        Ok(false)
+    }
+}
+
+impl Place {
+    /// Lists that had no room for what the frame needed, or hardly any.
+    fn shortages(&mut self) -> Result<Vec<Shortage>, TechniqueError> {
+        let mut shortages = Vec::new();
+        for (output, demand) in self.demands.iter().enumerate() {
+            shortages.extend(self.slot.read(output, |bytes| demand.shortage(bytes))?);
+        }
+        Ok(shortages)
+    }
+}

@@ -1,0 +1,204 @@
+//! A technique that is ready to run, and what can be read after it ran.
+
+use std::sync::Arc;
+
+use afterlight_graph::{Executor, FrameReport, ResourceId, gpu};
+use afterlight_scene::Camera;
+
+use afterlight_frame::{
+    CameraView, LightPairs, SceneLights, Settings, TechniqueError, View, ViewInput, ViewInputs,
+    capacity::{Capacities, Counter, Demand},
+    scene::{SceneGpu, draw_list::DrawChoice},
+    views,
+};
+
+/// Depth as the device has stored it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StoredDepth {
+    /// One a pixel, rows from the top; reversed, 0 where there is no surface.
+    pub values: Vec<f32>,
+    /// `[a, b, c, d]`: a depth z is at the view distance `(a z + b) / (c z + d)`, metres.
+    pub to_distance: [f32; 4],
+}
+
+/// Images of a frame that are kept for reading.
+#[derive(Clone, Copy)]
+pub(crate) struct Kept {
+    pub hdr: Option<ResourceId>,
+    /// Depth of opaque surfaces.
+    pub depth: Option<ResourceId>,
+    /// Counts of pairs in the place of radiance.
+    pub light_pairs: Option<ResourceId>,
+    pub final_color: ResourceId,
+}
+
+/// What a frame shows: all from which its inputs are computed.
+pub(crate) struct Viewed {
+    pub settings: Settings,
+    pub scene: Arc<SceneGpu>,
+    pub lights: Arc<SceneLights>,
+    pub camera: CameraView,
+    pub draws: DrawChoice,
+}
+
+impl Viewed {
+    /// Looks through another camera.
+    pub fn look_through(&mut self, camera: &Camera) {
+        self.settings.camera.clone_from(camera);
+        self.camera = CameraView::fitted(&self.settings, &self.scene);
+        self.draws.update(&self.scene, &self.camera, self.settings.effects.tessellation.displacement_m());
+    }
+
+    pub fn view(&self) -> View<'_> {
+        View {
+            camera: &self.camera,
+            settings: &self.settings,
+            scene: &self.scene,
+            lights: &self.lights,
+            visible: &self.draws.visible,
+        }
+    }
+}
+
+/// A technique ready to run, as often as wanted.
+pub struct Prepared {
+    device: gpu::Device,
+    pub(crate) executor: Executor,
+    pub(crate) viewed: Viewed,
+    pub(crate) inputs: Vec<ViewInput>,
+    /// Whether the inputs are all that depends on the view.
+    pub(crate) shows_all_views: bool,
+    pub(crate) capacities: Capacities,
+    pub(crate) demands: Vec<Demand>,
+    pub(crate) kept: Kept,
+    /// Draws in view.
+    pub draw_calls: u32,
+}
+
+impl Prepared {
+    pub(crate) fn new(
+        device: &gpu::Device,
+        executor: Executor,
+        viewed: Viewed,
+        inputs: ViewInputs,
+        capacities: Capacities,
+        kept: Kept,
+        draw_calls: u32,
+    ) -> Result<Self, TechniqueError> {
+        let (inputs, shows_all_views) = inputs.into_parts();
+        let demands = capacities.demands();
+        let device = device.clone();
+        let prepared =
+            Self { device, executor, viewed, inputs, shows_all_views, capacities, demands, kept, draw_calls };
+        prepared.fill_inputs()?;
+        Ok(prepared)
+    }
+
+    /// Writes the inputs for the view.
+    fn fill_inputs(&self) -> Result<(), TechniqueError> {
+        let mut uploader = self.device.uploader()?;
+        let mut bytes = Vec::new();
+        for input in &self.inputs {
+            bytes.clear();
+            bytes.resize(input.buffer.bytes() as usize, 0);
+            input.fill(&self.viewed.view(), &mut bytes);
+            uploader.buffer(&input.buffer, 0, &bytes)?;
+        }
+        Ok(uploader.finish()?)
+    }
+
+    /// Shows another view from the next frame on, without a new plan. False where the technique has recorded what holds for one view alone, or
+    /// what was prepared does not move: nothing changes then.
+    ///
+    /// # Errors
+    /// The device.
+    pub fn update(&mut self, camera: &Camera) -> Result<bool, TechniqueError> {
+        if !self.shows_all_views {
+            return Ok(false);
+        }
+        self.viewed.look_through(camera);
+        self.fill_inputs()?;
+        Ok(true)
+    }
+
+    /// Renders a frame and waits for it.
+    ///
+    /// # Errors
+    /// The device.
+    pub fn run(&mut self) -> Result<FrameReport, TechniqueError> {
+        Ok(self.executor.run()?)
+    }
+
+    /// The last frame, tone-mapped, sRGB, RGBA with 8 bits a channel, rows from the top.
+    ///
+    /// # Errors
+    /// The device.
+    pub fn final_rgba8(&mut self) -> Result<Vec<u8>, TechniqueError> {
+        Ok(self.executor.read_image(self.kept.final_color)?)
+    }
+
+    /// The last frame's linear radiance, RGBA, rows from the top; `None` unless [`Settings::keep_hdr`] was set. In views of
+    /// [`views::LIGHT_PAIRS`] red is the pairs that a pixel tested, green those that are lit.
+    ///
+    /// # Errors
+    /// The device.
+    pub fn hdr_rgba(&mut self) -> Result<Option<Vec<f32>>, TechniqueError> {
+        let Some(bytes) = self.hdr_bytes()? else { return Ok(None) };
+        let scale = if self.kept.light_pairs.is_some() { (1.0 / views::LIGHT_PAIR) as f32 } else { 1.0 };
+        let value = |half: &[u8]| half::f16::from_le_bytes([half[0], half[1]]).to_f32();
+        let of_pixel = |p: &[u8]| {
+            [scale * value(&p[..2]), scale * value(&p[2..4]), scale * value(&p[4..6]), value(&p[6..8])]
+        };
+        Ok(Some(bytes.chunks_exact(8).flat_map(of_pixel).collect()))
+    }
+
+    /// Pairs of a light and a surface that the last frame tested and lit; `None` unless [`Settings::view`] is one of
+    /// [`views::LIGHT_PAIRS`].
+    ///
+    /// # Errors
+    /// The device.
+    pub fn light_pairs(&mut self) -> Result<Option<LightPairs>, TechniqueError> {
+        let Some(counts) = self.kept.light_pairs else { return Ok(None) };
+        Ok(Some(LightPairs::of(&self.executor.read_image(counts)?, self.viewed.settings.samples)))
+    }
+
+    /// The last frame's linear radiance as it lies on the device, RGBA16F.
+    pub fn hdr_bytes(&mut self) -> Result<Option<Vec<u8>>, TechniqueError> {
+        Ok(self.kept.hdr.map(|hdr| self.executor.read_image(hdr)).transpose()?)
+    }
+
+    /// Depth of the last frame's opaque surfaces. `None` unless [`Settings::keep_depth`] was set and the technique has drawn 32-bit depth at one
+    /// sample, in the size of the frame.
+    ///
+    /// # Errors
+    /// The device.
+    pub fn depth(&mut self) -> Result<Option<StoredDepth>, TechniqueError> {
+        let Some(depth) = self.kept.depth else { return Ok(None) };
+        let bytes = self.executor.read_image(depth)?;
+        let values: Vec<f32> =
+            bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
+        let Settings { width_px, height_px, .. } = self.viewed.settings;
+        let pixels = width_px as usize * height_px as usize;
+        let Viewed { settings, scene, lights, camera, .. } = &self.viewed;
+        let to_distance = camera.constants(settings, lights, scene).depth_to_distance;
+        Ok((bytes.len() == 4 * pixels).then_some(StoredDepth { values, to_distance }))
+    }
+
+    /// What the last frame counted of everything that can overflow: what it needed, what there was, what was dropped.
+    ///
+    /// # Errors
+    /// The device.
+    pub fn counters(&mut self) -> Result<Vec<Counter>, TechniqueError> {
+        self.demands.iter().map(|demand| demand.read(&self.executor)).collect()
+    }
+
+    /// Width and height in pixels.
+    pub fn size_px(&self) -> (u32, u32) {
+        (self.viewed.settings.width_px, self.viewed.settings.height_px)
+    }
+
+    /// The executor, for memory figures and buffers that were kept.
+    pub fn executor(&mut self) -> &mut Executor {
+        &mut self.executor
+    }
+}
