@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use afterlight_experiments::{EXPERIMENTS, Options};
 use afterlight_lab::FrameSpec;
+use afterlight_lab::play::PLAY_FRAMES_MAX;
 use afterlight_lab::spec::{DEFAULT_SCENE, FRAMES_MAX, LIGHTS_MAX};
 use clap::{Args, Parser, Subcommand};
 
@@ -36,6 +37,8 @@ pub enum Command {
     Compare(CompareArgs),
     /// Check techniques from random views, and the reference against rays in f64
     Verify(VerifyArgs),
+    /// Play a camera path with frames in flight, and tell how steady they are
+    Play(PlayArgs),
     /// Run experiments
     Bench(BenchArgs),
     /// Print shell completions
@@ -130,6 +133,42 @@ pub struct CompareArgs {
     /// Write an HTML report (report.html) and its figures (report.json) into DIR
     #[arg(long, value_name = "DIR")]
     pub report: Option<PathBuf>,
+    #[command(flatten)]
+    pub json: JsonArgs,
+    #[command(flatten)]
+    pub common: CommonArgs,
+}
+
+/// Arguments of `play`.
+#[derive(Debug, Args)]
+pub struct PlayArgs {
+    /// A .gltf, .glb or .obj file, or builtin:NAME[?key=value&…]
+    #[arg(default_value = DEFAULT_SCENE)]
+    pub scene: String,
+    /// Techniques, by their ids; the first draws all frames, unless they take turns (--switch-every)
+    #[arg(long, value_name = "ID,ID…", value_delimiter = ',', required = true)]
+    pub technique: Vec<String>,
+    /// Camera path, a JSON file [default: a fly-through of the scene]
+    #[arg(long, value_name = "FILE")]
+    pub path: Option<PathBuf>,
+    /// Time that the path takes, seconds [default: that of all frames]
+    #[arg(long, value_name = "SECONDS", value_parser = above_zero)]
+    pub path_seconds: Option<f64>,
+    /// Frames
+    #[arg(long, value_name = "N", default_value_t = 300, value_parser = clap::value_parser!(u64).range(1..=PLAY_FRAMES_MAX))]
+    pub frames: u64,
+    /// Frames a second of the scene's time
+    #[arg(long, value_name = "F", default_value_t = 60.0, value_parser = above_zero)]
+    pub fps: f64,
+    /// Frames on their way at once
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=8))]
+    pub in_flight: u32,
+    /// Let the next technique take its turn after N frames
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub switch_every: Option<u32>,
+    /// Write every frame's picture: frames/%04d.png
+    #[arg(short, long, value_name = "PATTERN")]
+    pub output: Option<PathBuf>,
     #[command(flatten)]
     pub json: JsonArgs,
     #[command(flatten)]

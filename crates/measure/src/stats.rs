@@ -34,6 +34,37 @@ impl Spread {
     }
 }
 
+/// How a time is spread over many frames.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Distribution {
+    /// The middle one; the mean of the two middle ones where their number is even.
+    pub median: f64,
+    /// 95 of 100 are at most this: the least sample that 95% of all do not exceed.
+    pub p95: f64,
+    /// 99 of 100 are at most this.
+    pub p99: f64,
+    /// The greatest.
+    pub worst: f64,
+}
+
+impl Distribution {
+    /// Summarises samples; none where there is no finite one.
+    ///
+    /// ```
+    /// use afterlight_measure::Distribution;
+    /// let hundred: Vec<f64> = (1..=100).map(f64::from).collect();
+    /// assert_eq!(Distribution::of(&hundred), Some(Distribution { median: 50.5, p95: 95.0, p99: 99.0, worst: 100.0 }));
+    /// assert_eq!(Distribution::of(&[]), None);
+    /// ```
+    pub fn of(samples: &[f64]) -> Option<Distribution> {
+        let Spread { median, max, .. } = Spread::of(samples)?;
+        let mut sorted: Vec<f64> = samples.iter().copied().filter(|sample| sample.is_finite()).collect();
+        sorted.sort_by(f64::total_cmp);
+        let at_most = |percent: usize| sorted[(sorted.len() * percent).div_ceil(100) - 1];
+        Some(Distribution { median, p95: at_most(95), p99: at_most(99), worst: max })
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

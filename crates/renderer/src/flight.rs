@@ -179,6 +179,22 @@ impl Flight<'_> {
         self.hand_on(0, done)
     }
 
+    /// Hands frames that are done by now to `done`, and waits for none.
+    ///
+    /// # Errors
+    /// As [`Self::frame`].
+    pub fn poll(
+        &mut self,
+        done: &mut dyn FnMut(&Done<'_>) -> Result<(), TechniqueError>,
+    ) -> Result<(), TechniqueError> {
+        self.hand_on(usize::MAX, done)
+    }
+
+    /// Whether another view needs no new plan: all that depends on the view is an input.
+    pub fn moves_without_plans(&self) -> bool {
+        self.prepared.shows_all_views
+    }
+
     /// Bytes of the plan, and those that frames in flight hold for themselves.
     pub fn bytes(&self) -> (u64, u64) {
         (self.prepared.executor.plan().peak_bytes(), self.places.iter().map(|place| place.slot.bytes()).sum())

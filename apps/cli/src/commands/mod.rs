@@ -4,6 +4,7 @@ pub mod bench;
 pub mod compare;
 pub mod completions;
 pub mod devices;
+pub mod play;
 pub mod render;
 pub mod scene;
 pub mod techniques;

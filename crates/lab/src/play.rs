@@ -1,0 +1,323 @@
+//! Frames in flight along a camera path: what they take when nobody waits for them.
+
+use afterlight_measure::{
+    CapacityEvent, Distribution, HITCH_FACTOR, Hitch, Play, PlayMemory, Played, SCHEMA, Spread,
+};
+use afterlight_renderer::{Done, Event, Flight, FlightOptions, FrameContext, Shortfall};
+use afterlight_scene::camera::CameraPath;
+
+use crate::{Chosen, FrameSpec, LabError, Listener, Session, spec::check};
+
+/// Most frames of a path.
+pub const PLAY_FRAMES_MAX: u64 = 1_000_000;
+
+/// Neighbours on each side by which a hitch is judged.
+const NEIGHBOURS: usize = 8;
+
+/// How a path is played.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlaySpec {
+    /// Frames, 1 to [`PLAY_FRAMES_MAX`].
+    pub frames: u64,
+    /// Frames a second of the scene's time, above 0.
+    pub fps: f64,
+    /// Time that the path takes from its first keyframe to its last, seconds; the time of all frames where none is given.
+    pub path_s: Option<f64>,
+    /// Frames on their way at once, 1 to 8.
+    pub in_flight: u32,
+    /// Frames after which the next technique takes its turn.
+    pub switch_every: Option<u32>,
+}
+
+impl PlaySpec {
+    /// Checks ranges.
+    ///
+    /// # Errors
+    /// The first setting that is out of its range, with the range.
+    pub fn check(&self) -> Result<(), LabError> {
+        let expected = format!("a whole number from 1 to {PLAY_FRAMES_MAX}");
+        check("frames", self.frames, (1..=PLAY_FRAMES_MAX).contains(&self.frames), expected)?;
+        check("fps", self.fps, self.fps > 0.0 && self.fps.is_finite(), "a number above 0")?;
+        check("in-flight", self.in_flight, (1..=8).contains(&self.in_flight), "a whole number from 1 to 8")?;
+        if let Some(every) = self.switch_every {
+            check("switch-every", every, every > 0, "a whole number above 0")?;
+        }
+        Ok(())
+    }
+
+    /// Place on the path of a frame, 0 to 1. A path that is longer than the frames is flown in part, a shorter one again and again.
+    fn place(&self, frame: u64) -> f32 {
+        let time_s = frame as f64 / self.fps;
+        let path_s = self.path_s.unwrap_or_else(|| self.frames.saturating_sub(1).max(1) as f64 / self.fps);
+        let rounds = time_s / path_s;
+        (if rounds > 1.0 { rounds.fract() } else { rounds }) as f32
+    }
+}
+
+/// Sees the pictures of frames: RGBA with 8 bits a channel, sRGB-encoded, rows from the top.
+pub type SeesPicture<'a> = dyn FnMut(u64, &[u8]) -> Result<(), LabError> + 'a;
+
+/// What was seen of a frame.
+struct Seen {
+    technique: usize,
+    start_ns: Option<f64>,
+    end_ns: Option<f64>,
+    gpu_ns: Option<f64>,
+    cpu_ms: f64,
+    events: Vec<Event>,
+    fell_short: bool,
+}
+
+/// Plays a path with one technique after another. `sees` gets every picture, where there is one who wants them.
+///
+/// # Errors
+/// A technique that cannot draw these frames, the device, those of `sees`.
+pub fn play(
+    session: &Session,
+    spec: &FrameSpec,
+    (path, how): (&CameraPath, &PlaySpec),
+    chosen: &[Chosen],
+    mut sees: Option<&mut SeesPicture<'_>>,
+    listener: &dyn Listener,
+) -> Result<Play, LabError> {
+    how.check()?;
+    let options =
+        FlightOptions { in_flight: how.in_flight, shortfall: Shortfall::DrawAgain, pictures: sees.is_some() };
+    let first = path.at(how.place(0));
+    let task = listener.task("preparing", chosen.len() as u64);
+    let mut flights = Vec::with_capacity(chosen.len());
+    for one in chosen {
+        task.at(one.id());
+        flights.push(session.renderer.fly(one.technique, &one.params, &first, options)?);
+        task.advance();
+    }
+    drop(task);
+
+    let task = listener.task("frames", how.frames);
+    let mut seen: Vec<Option<Seen>> = (0..how.frames).map(|_| None).collect();
+    let mut failed = None;
+    for frame in 0..=how.frames {
+        let is_over = frame == how.frames;
+        let turn = how.switch_every.map_or(0, |every| frame / u64::from(every)) as usize % flights.len();
+        for (technique, flight) in flights.iter_mut().enumerate() {
+            let mut done = |done: &Done<'_>| {
+                seen[done.index as usize] = Some(Seen::of(technique, done));
+                if let (Some(sees), Some(rgba8)) = (&mut sees, done.rgba8)
+                    && failed.is_none()
+                {
+                    failed = sees(done.index, rgba8).err();
+                }
+                task.advance();
+                Ok(())
+            };
+            match (is_over, technique == turn) {
+                (true, _) => flight.land(&mut done)?,
+                (false, true) => {
+                    let camera = path.at(how.place(frame));
+                    flight.frame(
+                        FrameContext { index: frame, time_s: frame as f64 / how.fps, camera },
+                        &mut done,
+                    )?;
+                }
+                (false, false) => flight.poll(&mut done)?,
+            }
+        }
+        if let Some(error) = failed.take() {
+            return Err(error);
+        }
+    }
+    drop(task);
+    let seen: Vec<Seen> = seen.into_iter().flatten().collect();
+    Ok(record(session, spec, (path, how), (chosen, &flights), &seen))
+}
+
+impl Seen {
+    fn of(technique: usize, done: &Done<'_>) -> Seen {
+        Seen {
+            technique,
+            start_ns: done.times.start_ns,
+            end_ns: done.times.end_ns,
+            gpu_ns: done.times.frame_ns,
+            cpu_ms: done.cpu.as_secs_f64() * 1e3,
+            events: done.events.to_vec(),
+            fell_short: done.fell_short,
+        }
+    }
+}
+
+/// From the end of each frame to the end of the next, milliseconds; the first frame has none.
+fn intervals_ms(seen: &[Seen]) -> Option<Vec<f64>> {
+    let ends_ns: Vec<f64> = seen.iter().map(|frame| frame.end_ns).collect::<Option<_>>()?;
+    Some(ends_ns.windows(2).map(|ends| (ends[1] - ends[0]) * 1e-6).collect())
+}
+
+/// Fraction of the time in which the device had no frame to work on.
+fn idle_fraction(seen: &[Seen]) -> Option<f64> {
+    let spans: Vec<[f64; 2]> =
+        seen.iter().map(|frame| Some([frame.start_ns?, frame.end_ns?])).collect::<Option<_>>()?;
+    let ([start_ns, _], [_, end_ns]) = (*spans.first()?, *spans.last()?);
+    let idle_ns: f64 = spans.windows(2).map(|pair| (pair[1][0] - pair[0][1]).max(0.0)).sum();
+    (end_ns > start_ns).then(|| idle_ns / (end_ns - start_ns))
+}
+
+/// Frames that took longer than their neighbours. `intervals_ms[i]` is the time of frame `i + 1`.
+fn hitches(intervals_ms: &[f64], seen: &[Seen], ids: &[&str]) -> Vec<Hitch> {
+    let mut hitches = Vec::new();
+    for (i, ms) in intervals_ms.iter().copied().enumerate() {
+        let from = i.saturating_sub(NEIGHBOURS);
+        let end = (i + 1 + NEIGHBOURS).min(intervals_ms.len());
+        // Another technique's frames are no neighbours.
+        let is_beside = |k: &usize| *k != i && seen[k + 1].technique == seen[i + 1].technique;
+        let beside: Vec<f64> = (from..end).filter(is_beside).map(|k| intervals_ms[k]).collect();
+        let Some(Spread { median: neighbours_ms, .. }) = Spread::of(&beside) else { continue };
+        if ms > HITCH_FACTOR * neighbours_ms {
+            let frame = &seen[i + 1];
+            let mut causes: Vec<String> = frame.events.iter().map(cause).collect();
+            if seen[i].technique != frame.technique {
+                causes.push(format!("switched to {}", ids[frame.technique]));
+            }
+            hitches.push(Hitch { frame: (i + 1) as u64, ms, neighbours_ms, causes });
+        }
+    }
+    hitches
+}
+
+fn cause(event: &Event) -> String {
+    match event {
+        Event::Planned => "planned anew for its view".to_owned(),
+        Event::Grown(shortage) => format!("{} grew", shortage.list),
+        Event::DrawnAgain => "drawn again".to_owned(),
+    }
+}
+
+fn record(
+    session: &Session,
+    spec: &FrameSpec,
+    (path, how): (&CameraPath, &PlaySpec),
+    (chosen, flights): (&[Chosen], &[Flight<'_>]),
+    seen: &[Seen],
+) -> Play {
+    let ids: Vec<&str> = chosen.iter().map(Chosen::id).collect();
+    let played = |technique: usize| {
+        let of = || seen.iter().filter(move |frame| frame.technique == technique);
+        let gpu_ms: Vec<f64> = of().filter_map(|frame| frame.gpu_ns).map(|ns| ns * 1e-6).collect();
+        let cpu_ms: Vec<f64> = of().map(|frame| frame.cpu_ms).collect();
+        Played {
+            technique: ids[technique].to_owned(),
+            frames: of().count() as u64,
+            gpu_ms: Distribution::of(&gpu_ms),
+            cpu_ms: Distribution::of(&cpu_ms),
+            moves_without_plans: flights[technique].moves_without_plans(),
+        }
+    };
+    let grown = |(frame, seen): (u64, &Seen)| -> Vec<CapacityEvent> {
+        let one = |event: &Event| match event {
+            Event::Grown(short) => Some(CapacityEvent {
+                frame,
+                list: short.list.to_owned(),
+                needed: short.needed,
+                capacity: short.capacity,
+                dropped: short.dropped,
+            }),
+            Event::Planned | Event::DrawnAgain => None,
+        };
+        seen.events.iter().filter_map(one).collect()
+    };
+    let intervals_ms = intervals_ms(seen);
+    let cpu_ms: Vec<f64> = seen.iter().map(|frame| frame.cpu_ms).collect();
+    let memory = flights.iter().map(Flight::bytes).fold(PlayMemory::default(), |sum, (plan, own)| {
+        PlayMemory { plan_bytes: sum.plan_bytes + plan, in_flight_bytes: sum.in_flight_bytes + own }
+    });
+    Play {
+        schema: SCHEMA,
+        device: session.device.clone(),
+        scene: session.scene.clone(),
+        settings: session.settings_record(spec, u32::try_from(how.frames).unwrap_or(u32::MAX), ids[0]),
+        path: path.name.clone(),
+        fps: how.fps,
+        in_flight: how.in_flight,
+        switch_every: how.switch_every,
+        techniques: (0..chosen.len()).map(played).collect(),
+        frame_ms: intervals_ms.as_deref().and_then(Distribution::of),
+        cpu_ms: Distribution::of(&cpu_ms),
+        idle_fraction: idle_fraction(seen),
+        hitches: intervals_ms.map_or_else(Vec::new, |intervals_ms| hitches(&intervals_ms, seen, &ids)),
+        capacity_events: (0..).zip(seen).flat_map(grown).collect(),
+        fell_short: (0..).zip(seen).filter(|(_, frame)| frame.fell_short).map(|(index, _)| index).collect(),
+        memory,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn frame(technique: usize, start_ms: f64, end_ms: f64) -> Seen {
+        Seen {
+            technique,
+            start_ns: Some(start_ms * 1e6),
+            end_ns: Some(end_ms * 1e6),
+            gpu_ns: None,
+            cpu_ms: 0.0,
+            events: Vec::new(),
+            fell_short: false,
+        }
+    }
+
+    /// Frames of 10 ms, one of which takes 30 and waits 10 before it.
+    fn frames() -> Vec<Seen> {
+        let mut frames: Vec<Seen> =
+            (0..20).map(|i| frame(0, 10.0 * f64::from(i), 10.0 * f64::from(i + 1))).collect();
+        for (i, one) in frames.iter_mut().enumerate().skip(12) {
+            let shift_ns = if i == 12 { [10e6, 30e6] } else { [30e6; 2] };
+            one.start_ns = one.start_ns.map(|ns| ns + shift_ns[0]);
+            one.end_ns = one.end_ns.map(|ns| ns + shift_ns[1]);
+        }
+        frames[12].events.push(Event::Planned);
+        frames
+    }
+
+    #[test]
+    fn a_frame_that_takes_four_times_as_long_is_a_hitch() {
+        let seen = frames();
+        let intervals_ms = intervals_ms(&seen).expect("timestamps");
+        let found = hitches(&intervals_ms, &seen, &["a"]);
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert_eq!(
+            (found[0].frame, found[0].causes.as_slice()),
+            (12, &["planned anew for its view".to_owned()][..])
+        );
+        assert!((found[0].ms - 40.0).abs() < 1e-9 && (found[0].neighbours_ms - 10.0).abs() < 1e-9);
+        let without = vec![Seen { end_ns: None, ..frame(0, 0.0, 1.0) }];
+        assert_eq!(super::intervals_ms(&without), None);
+    }
+
+    #[test]
+    fn idle_time_is_what_lies_between_frames() {
+        let idle = idle_fraction(&frames()).expect("timestamps");
+        assert!((idle - 10.0 / 230.0).abs() < 1e-9, "{idle}");
+    }
+
+    /// A slower technique is no hitch, unless its first frame is slower than its others.
+    #[test]
+    fn other_techniques_are_no_neighbours() {
+        let (mut seen, mut now_ms) = (Vec::new(), 0.0);
+        for i in 0..24 {
+            let technique = i / 6 % 2;
+            let ms = if technique == 1 { 40.0 } else { 10.0 };
+            seen.push(frame(technique, now_ms, now_ms + ms));
+            now_ms += ms;
+        }
+        let intervals_ms = intervals_ms(&seen).expect("timestamps");
+        assert!(hitches(&intervals_ms, &seen, &["a", "b"]).is_empty());
+    }
+
+    #[test]
+    fn places_run_along_the_path_and_begin_anew() {
+        let how = PlaySpec { frames: 11, fps: 10.0, path_s: None, in_flight: 3, switch_every: None };
+        assert_eq!((how.place(0), how.place(5), how.place(10)), (0.0, 0.5, 1.0));
+        let how = PlaySpec { path_s: Some(0.5), ..how };
+        assert_eq!((how.place(5), how.place(10)), (1.0, 0.0));
+        assert!((how.place(6) - 0.2).abs() < 1e-6);
+    }
+}
