@@ -1,4 +1,4 @@
-// Sortable bits of floats, and the floats made of them again: 2 x 256 floats of all magnitudes and both signs, by their place.
+// Sortable bits of floats, and the floats made of them again: 256 floats of all magnitudes and both signs.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -11,7 +11,7 @@ layout(set = 0, binding = 8, scalar) writeonly buffer Found {
 
 void main() {
     uint place = gl_GlobalInvocationID.x;
-    float value = uintBitsToFloat(place * 0x00ffffffu);    // no number that is none among them
+    float value = uintBitsToFloat(place * 0x00effff1u);    // no NaN among them
     // Halves of 16 bits, which a float holds.
     uint bits = sortable_bits(value);
     found[3u * place] = float(bits >> 16);

@@ -4,7 +4,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
-#include "items.glsl"
+#include "shared/sort/items.glsl"
 
 layout(local_size_x = 256) in;      // THREADS
 layout(set = 0, binding = 9, scalar) readonly buffer Keys {

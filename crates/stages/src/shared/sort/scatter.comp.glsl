@@ -7,7 +7,7 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_EXT_control_flow_attributes : require
-#include "items.glsl"
+#include "shared/sort/items.glsl"
 #include "group_sum.glsl"
 
 layout(set = 0, binding = 9, scalar) readonly buffer Keys {
