@@ -100,8 +100,8 @@ pub enum ItemCount<'a> {
 /// Items in order.
 #[derive(Debug)]
 pub struct Sorted {
-    /// The items. Their buffers are those that were given where the number of steps is even, else others; what stands behind the last item is
-    /// undefined.
+    /// The items. Their buffers are those that were given where the number of steps is even or nothing is to be sorted, else others; what
+    /// stands behind the last item is undefined.
     pub items: Items,
     /// Where the count was on the device: items asked for, and those that found no room and are not sorted, as
     /// [`Frame::watch`] reads them; the capacity is that of the items before the sort.

@@ -1,6 +1,5 @@
 // Moves every item behind those with a lower digit, and behind those with the same digit that stood before it: a group a batch, in rows. The
-// group first sorts its batch in shared memory, so that neighbouring threads write neighbouring items (Satish, Harris and Garland 2009,
-// section 4).
+// group first sorts its batch in shared memory, so that neighbouring threads write neighbouring items (satish-2009).
 //
 // In: Keys, Values, Histogram (as scan.comp leaves it), DigitTotals. Out: KeysOut, ValuesOut.
 #version 460
