@@ -313,14 +313,14 @@ fn more_batches_than_threads_that_sum_them() {
     let gpu = afterlight_testkit::gpu();
     let on = tiny_stage(&gpu);
     let count = 257 * BATCH_ITEMS + 1;
-    let case = case("many batches", random_items(count), Asked::Known(count), KeyBits::Low16);
+    let case = case("many batches", random_items(count), Asked::OnDevice(count), KeyBits::Low16);
     check(&on, std::slice::from_ref(&case), &[]);
     let wrong = mutant("scan", "scan.comp.glsl", "before += count;", "before += 1u;");
     let found = sorted_with(&on, std::slice::from_ref(&case), &[wrong]).remove(0);
     assert!(found.items != case.expected(), "a batch that is not summed goes unseen");
 }
 
-/// Rows of dispatches: three groups each, where the last row has more groups than there are batches.
+/// Rows of dispatches: 25 batches in seven rows of four groups, three of which have no batch.
 #[test]
 fn more_batches_than_groups_of_a_row() {
     let gpu = afterlight_testkit::gpu();
@@ -334,9 +334,9 @@ fn more_batches_than_groups_of_a_row() {
         )
     };
     let case = case("rows", random_items(24 * BATCH_ITEMS + 9), Asked::OnDevice(u32::MAX), KeyBits::Low24);
-    let three = rows_of("uint rows = max(groups / 4u + min(groups % 4u, 1u), 1u);");
-    check(&on, std::slice::from_ref(&case), &[three]);
-    // 25 batches in 6 rows of 4: a batch without a group is seen.
+    let rows_of_four = rows_of("uint rows = max(groups / 4u + min(groups % 4u, 1u), 1u);");
+    check(&on, std::slice::from_ref(&case), &[rows_of_four]);
+    // The last batch has no group.
     let too_few = rows_of("uint rows = 6u; groups -= 1u;");
     let found = sorted_with(&on, std::slice::from_ref(&case), &[too_few]).remove(0);
     assert!(found.items != case.expected(), "a batch without a group goes unseen");
@@ -360,10 +360,10 @@ fn items_do_not_depend_on_the_size_of_subgroups() {
     }
 }
 
-/// A sort that is wrong in one place of its shaders.
+/// A pass of a sort of a count on the device that is wrong in one place.
 fn mutant(pass: &str, header: &str, from: &str, to: &str) -> Shader {
     let header = format!("shared/sort/{header}");
-    compiled_variant(&format!("shared/sort/{pass}.comp"), &header, &[(from, to)])
+    compiled_variant(&format!("shared/sort/{pass}.comp#counted"), &header, &[(from, to)])
 }
 
 #[test]
@@ -371,25 +371,30 @@ fn wrong_sorts_are_caught() {
     let gpu = afterlight_testkit::gpu();
     let on = tiny_stage(&gpu);
     let count = 3 * BATCH_ITEMS + 77;
-    // Keys behind the last item keep what a wrong place writes within the buffers.
+    // Room of a batch behind the last item, farther than which no mutant writes; nor does any reach out of shared memory.
     let few: Vec<(u32, u32)> =
         (0..count + BATCH_ITEMS).map(|i| (i.wrapping_mul(0x9e37_79b9) >> 28, i)).collect();
-    let of = |key_bits| case("mutant", few.clone(), Asked::Known(count), key_bits);
+    let by_one_digit = case("mutant", few, Asked::OnDevice(count), KeyBits::Low8);
+    let by_two_digits = case("mutant", random_items(count), Asked::OnDevice(count), KeyBits::Low16);
     let (scan, scatter) = ("scan.comp.glsl", "scatter.comp.glsl");
     let mutants = [
         // The histogram off by one: sums that hold their own batch.
         ("scan", scan, "histogram[first + batch] = before;", "histogram[first + batch] = before + count;"),
         ("scatter", scatter, "const uint NO_ITEM = 0xffffffffu;", "const uint NO_ITEM = 0u;"),
-        ("scatter", scatter, "pool[mark] = 0u;", ""),
-        ("scatter", scatter, "places[t * DIGITS + digit] = of_digit;", ""),
+        (
+            "scatter",
+            scatter,
+            "places[slot] += uint(bitCount(peers));",
+            "places[slot] = uint(bitCount(peers));",
+        ),
+        ("scatter", scatter, "places[t * DIGITS + digit] = of_digit;", "places[t * DIGITS + digit] = 0u;"),
         ("count", "count.comp.glsl", "first + round * THREADS < end", "first + round * THREADS + 1u < end"),
         ("count", "items.glsl", "key >> sort.shift", "key >> (sort.shift + 1u)"),
     ];
     for (pass, header, from, to) in mutants {
         let shader = mutant(pass, header, from, to);
-        let case = of(KeyBits::Low8);
-        let found = sorted_with(&on, std::slice::from_ref(&case), &[shader]).remove(0);
-        assert!(found.items != case.expected(), "{pass}: {to:?} goes unseen");
+        let found = sorted_with(&on, std::slice::from_ref(&by_one_digit), &[shader]).remove(0);
+        assert!(found.items != by_one_digit.expected(), "{pass}: {to:?} goes unseen");
     }
     // Ranks that are right but for the order of equal keys: lanes from last to first, teams in another order than that of their items.
     let unstable = [
@@ -400,23 +405,18 @@ fn wrong_sorts_are_caught() {
         ),
     ];
     for (from, to) in unstable {
-        let case = of(KeyBits::Low8);
         let shader = mutant("scatter", scatter, from, to);
-        let found = sorted_with(&on, std::slice::from_ref(&case), &[shader]).remove(0);
+        let found =
+            sorted_with(&on, std::slice::from_ref(&by_one_digit), std::slice::from_ref(&shader)).remove(0);
+        let (found, expected) = (found.items, by_one_digit.expected());
         let keys = |items: &[(u32, u32)]| items.iter().map(|(key, _)| *key).collect::<Vec<_>>();
-        assert_eq!(keys(&found.items), keys(&case.expected()), "{to}: not even the keys are in order");
-        assert!(found.items != case.expected(), "{to}: a sort that is not stable goes unseen");
+        assert_eq!(keys(&found), keys(&expected), "{to}: not even the keys are in order");
+        assert!(found != expected, "{to}: a sort that is not stable goes unseen");
         // Digits above the first ask for the order of those below.
-        let case = case_of_two_digits(count);
-        let shader = mutant("scatter", scatter, from, to);
-        let found = sorted_with(&on, std::slice::from_ref(&case), &[shader]).remove(0);
-        assert!(!found.items.is_sorted_by_key(|(key, _)| *key), "{to}: goes unseen by two digits");
+        let found = sorted_with(&on, std::slice::from_ref(&by_two_digits), &[shader]).remove(0);
+        let low = |(key, _): &(u32, u32)| key & 0xffff;
+        assert!(!found.items.is_sorted_by_key(low), "{to}: goes unseen by two digits");
     }
-}
-
-fn case_of_two_digits(count: u32) -> Case {
-    let items = random_items(count).into_iter().map(|(key, value)| (key & 0xffff, value)).collect();
-    case("two digits", items, Asked::Known(count), KeyBits::Low16)
 }
 
 /// Bits of floats as the shaders make them are those that the host makes.

@@ -12,6 +12,10 @@ const DIGITS: u32 = 256;
 /// Items of a group: `BATCH_ITEMS` in `items.glsl`. More would not fit the 32 KiB of shared memory that small devices have.
 const BATCH_ITEMS: u32 = 4096;
 
+/// Shared memory of a group of `scatter.comp.glsl`: the batch, counts of eight teams, how far digits move, sums. Vulkan promises no more than
+/// 16 KiB.
+const SHARED_BYTES: u32 = 4 * (BATCH_ITEMS + 8 * DIGITS + DIGITS + 256);
+
 /// How many low bits of a key decide. The others are carried along.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum KeyBits {
@@ -114,8 +118,8 @@ pub struct Sorted {
 /// [`Sorted::demand`].
 ///
 /// # Errors
-/// A known count above the capacity, or buffers that one binding does not reach: [`TechniqueError::TooLarge`]. A shader that is not compiled
-/// in.
+/// A known count above the capacity, buffers that one binding does not reach, a device whose groups share too little memory:
+/// [`TechniqueError::TooLarge`]. A shader that is not compiled in.
 pub fn by_key(
     graph: &mut Graph,
     frame: &Frame<'_>,
@@ -128,6 +132,7 @@ pub fn by_key(
     for (what, buffer) in [("keys", &items.keys), ("values", &items.values)] {
         frame.check_binding(name, &format!("{what} to sort"), buffer.bytes())?;
     }
+    check_shared(name, frame.features().max_shared_memory_bytes)?;
     let capacity = items.capacity();
     let (most, size) = match count {
         ItemCount::Known(found) if found > capacity => {
@@ -144,6 +149,15 @@ pub fn by_key(
     let sort = Sort { frame, name, roles, most, size };
     let items = sort.declare(graph, items, key_bits)?;
     Ok(Sorted { items, demand: sort.size.map(|size| size.demand) })
+}
+
+/// Checks that a group of a device has the shared memory.
+fn check_shared(name: &str, limit: u32) -> Result<(), TechniqueError> {
+    if SHARED_BYTES > limit {
+        let what = format!("{name}: bytes of shared memory to sort");
+        return Err(TechniqueError::TooLarge { what, found: SHARED_BYTES.into(), limit: limit.into() });
+    }
+    Ok(())
 }
 
 /// What is known on the device alone.
@@ -308,6 +322,13 @@ mod tests {
         }
         assert_eq!(KeyBits::ALL.map(KeyBits::mask), [0xff, 0xffff, 0xff_ffff, u32::MAX]);
         assert_eq!(KeyBits::Low24.shifts().collect::<Vec<_>>(), [0, 8, 16]);
+    }
+
+    #[test]
+    fn a_device_of_too_little_shared_memory_is_told() {
+        assert!(check_shared("s", 26_624).is_ok());
+        let error = check_shared("s", 26_623).expect_err("a byte less").to_string();
+        assert_eq!(error, "s: bytes of shared memory to sort: found 26624, expected at most 26623");
     }
 
     proptest::proptest! {
