@@ -142,8 +142,26 @@ fn a_layer_that_looks_up_is_caught() {
         let step = format!("use crate::{path};\n");
         let root = tree(&[above[0], above[1], ("crates/stages/src/lights/step/mod.rs", &step)]);
         let start = format!("crates/stages/src/lights/step/mod.rs:1: found lights/step uses {folder}");
-        expect_one(root.path(), &start, "only lights");
+        expect_one(root.path(), &start, "only shared/sort, lights");
     }
+}
+
+/// The sort lies below all stages, though it stands in a folder above most.
+#[test]
+fn every_stage_may_sort_and_the_sort_uses_none() {
+    let sort = "crates/stages/src/shared/sort/mod.rs";
+    let lights = "crates/stages/src/lights/bvh/mod.rs";
+    let root = tree(&[(sort, ""), (lights, "use crate::shared::sort;\n")]);
+    assert_eq!(broken(root.path()), [] as [&str; 0]);
+    let root = tree(&[(sort, "use crate::lights::bvh;\n"), (lights, "")]);
+    expect_one(root.path(), &format!("{sort}:1: found shared/sort uses lights/bvh"), "only shared/sort");
+    let root =
+        tree(&[("crates/stages/src/shared/shadow/mod.rs", ""), (lights, "use crate::shared::shadow;\n")]);
+    expect_one(
+        root.path(),
+        &format!("{lights}:1: found lights/bvh uses shared/shadow"),
+        "only shared/sort, lights",
+    );
 }
 
 #[test]
@@ -208,7 +226,7 @@ fn a_manifest_that_names_what_is_above_it_is_caught() {
     expect_one(
         root.path(),
         "crates/stages/src/lights/cells/variants.txt:2: found lights/cells uses surfaces/x",
-        "only lights",
+        "only shared/sort, lights",
     );
 }
 

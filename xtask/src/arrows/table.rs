@@ -171,8 +171,15 @@ pub static TABLE: Table = Table {
         },
         Folders {
             crate_folder: "crates/stages",
-            rule: Rule::Layers(&[&["lights"], &["surfaces"], &["views"], &["shared"], &["compose"]]),
-            reason: "lights are listed for places, whatever stands there; surfaces are shaded by the lights; views show both; \
+            rule: Rule::Layers(&[
+                &["shared/sort"],
+                &["lights"],
+                &["surfaces"],
+                &["views"],
+                &["shared"],
+                &["compose"],
+            ]),
+            reason: "a sort knows keys alone; lights are listed for places, whatever stands there; surfaces are shaded by the lights; views show both; \
                      shared work draws surfaces; what a frame ends in comes last",
         },
         Folders { crate_folder: "crates/renderer", rule: Rule::Layers(&[]), reason: "no circles" },
