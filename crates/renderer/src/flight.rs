@@ -129,7 +129,7 @@ impl Renderer {
         options: FlightOptions,
     ) -> Result<Flight<'r>, TechniqueError> {
         let prepared = self.prepare_moving(technique, params, camera)?;
-        Ok(Flight {
+        let mut flight = Flight {
             renderer: self,
             technique,
             params: completed(technique, params),
@@ -138,7 +138,13 @@ impl Renderer {
             demands: prepared.demands.clone().into(),
             prepared,
             places: VecDeque::new(),
-        })
+        };
+        // Ahead of the frames that need them.
+        for _ in 0..options.in_flight.max(1) {
+            let place = flight.new_place()?;
+            flight.places.push_back(place);
+        }
+        Ok(flight)
     }
 }
 
@@ -214,7 +220,7 @@ impl Flight<'_> {
             None => {
                 // Places of older plans are of no use.
                 self.places.retain(|place| place.flying.is_some());
-                Place { slot: self.slot()?, plan: self.plan, demands: self.demands.clone(), flying: None }
+                self.new_place()?
             }
         };
         let view = self.prepared.viewed.view();
@@ -225,9 +231,11 @@ impl Flight<'_> {
         Ok(place)
     }
 
-    fn slot(&self) -> Result<FrameSlot, TechniqueError> {
+    /// A place of the current plan.
+    fn new_place(&self) -> Result<Place, TechniqueError> {
         let inputs: Vec<_> = self.prepared.inputs.iter().map(|input| input.buffer.clone()).collect();
-        Ok(self.prepared.executor.slot(&inputs, &self.outputs())?)
+        let slot = self.prepared.executor.slot(&inputs, &self.outputs())?;
+        Ok(Place { slot, plan: self.plan, demands: self.demands.clone(), flying: None })
     }
 
     /// What is read after each frame: a counter a list, then the picture.

@@ -3,12 +3,12 @@
 mod common;
 
 use afterlight_image::Rgba8Image;
-use afterlight_renderer::{Done, Event, Flight, FlightOptions, FrameContext, Renderer};
+use afterlight_renderer::{Done, Event, Flight, FlightOptions, FrameContext, Renderer, Shortfall};
 use afterlight_techniques::{
-    Params, Technique, TechniqueError, registry,
+    Params, Technique, TechniqueError, find, registry,
     scene::{Camera, Projection},
 };
-use common::{Stage, image_of, psnr};
+use common::{Stage, image_of, params, psnr};
 use glam::Vec3;
 
 const SIZE: (u32, u32) = (97, 55);
@@ -104,4 +104,56 @@ fn every_frame_is_the_picture_of_its_view() {
         }
     }
     assert!(compared >= 24, "{compared}");
+}
+
+/// A view that needs a hundred times the room of the view before it: the frame is drawn again before it is handed on, or told to have fallen
+/// short, as asked; and the flight goes on without a frame that lacks anything.
+#[test]
+fn a_view_that_needs_far_more_than_the_last_is_drawn_again_or_told() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, SCENE);
+    let near = path(&stage, 3);
+    // Away from everything: lists need nothing.
+    let bounds = stage.scene.bounds_ws();
+    let away = bounds.max + bounds.size();
+    let nothing = Camera::look_at("away", away, away + Vec3::ONE, 1.0, 0.1);
+    let cameras = [&nothing, &nothing, &near[0], &near[1], &near[2], &nothing, &near[0]].map(Clone::clone);
+    for (id, sets, samples) in [
+        ("gbuffer-list", &[][..], 4),
+        ("dais", &[("fill", "cache")][..], 4),
+        ("dais-list", &[][..], 4),
+        ("clustered", &[][..], 1),
+        ("light-list", &[][..], 1),
+    ] {
+        let technique = find(id).expect("known");
+        let params = params(technique, sets);
+        let mut settings = stage.from(nothing.clone(), SIZE, LIGHTS);
+        settings.samples = samples;
+        let renderer = Renderer::with_scene(&stage.device, stage.uploaded.clone(), &settings);
+        let renderer = renderer.unwrap_or_else(|e| panic!("{e}"));
+        let mut flight =
+            renderer.fly(technique, &params, &nothing, options()).unwrap_or_else(|e| panic!("{id}: {e}"));
+        let (pictures, events) = flown(&mut flight, &cameras);
+        let alone = alone(&stage, technique, &params, samples, &cameras);
+        let off: Vec<_> = unlike(&pictures, &alone).into_iter().filter(|(_, db)| *db < UNORDERED_DB).collect();
+        assert!(off.is_empty(), "{id}: frames and dB {off:?}");
+        assert!(events[2].contains(&Event::DrawnAgain), "{id}: {events:?}");
+        assert!(events[0].is_empty() && events[6].is_empty(), "{id}: {events:?}");
+
+        let tell = FlightOptions { shortfall: Shortfall::Tell, ..options() };
+        let mut flight =
+            renderer.fly(technique, &params, &nothing, tell).unwrap_or_else(|e| panic!("{id}: {e}"));
+        let mut short = Vec::new();
+        let mut done = |frame: &Done<'_>| -> Result<(), TechniqueError> {
+            assert!(!frame.events.contains(&Event::DrawnAgain), "{id}");
+            short.push(frame.fell_short);
+            Ok(())
+        };
+        for (index, camera) in (0..).zip(&cameras) {
+            let context = FrameContext { index, time_s: 0.0, camera: camera.clone() };
+            flight.frame(context, &mut done).unwrap_or_else(|e| panic!("{id}: {e}"));
+        }
+        flight.land(&mut done).unwrap_or_else(|e| panic!("{id}: {e}"));
+        assert_eq!((short[0], short[2], short[6]), (false, true, false), "{id}: {short:?}");
+    }
 }
