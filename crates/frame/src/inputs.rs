@@ -6,7 +6,7 @@ use std::{
 };
 
 use afterlight_graph::{
-    BufferHandle, BufferRole, Graph,
+    BufferHandle, BufferRole, Graph, RasterPass, ScriptId, Step,
     gpu::{self, vk},
 };
 
@@ -49,18 +49,36 @@ impl ViewInput {
     }
 }
 
+/// The draws of a pass that are chosen for every view.
+pub struct ViewScript {
+    /// The pass's script.
+    pub script: ScriptId,
+    steps: Box<Steps>,
+}
+
+/// Chooses the steps of a script for a view.
+type Steps = dyn Fn(&View<'_>) -> Vec<Step> + Send + Sync;
+
+impl ViewScript {
+    /// The steps for a view.
+    pub fn steps(&self, view: &View<'_>) -> Vec<Step> {
+        (self.steps)(view)
+    }
+}
+
 /// The inputs that a frame declares while it is recorded.
 #[derive(Default)]
 pub struct ViewInputs {
     inputs: RefCell<Vec<ViewInput>>,
+    scripts: RefCell<Vec<ViewScript>>,
     holds_for_one_view: Cell<bool>,
 }
 
 impl ViewInputs {
-    /// The inputs in the order of their declaration, and whether they are all that depends on the view: false where what was recorded
-    /// holds for that view alone, so that another one must be recorded anew.
-    pub fn into_parts(self) -> (Vec<ViewInput>, bool) {
-        (self.inputs.into_inner(), !self.holds_for_one_view.get())
+    /// The inputs and scripts in the order of their declaration, and whether they are all that depends on the view: false where what was
+    /// recorded holds for that view alone, so that another one must be recorded anew.
+    pub fn into_parts(self) -> (Vec<ViewInput>, Vec<ViewScript>, bool) {
+        (self.inputs.into_inner(), self.scripts.into_inner(), !self.holds_for_one_view.get())
     }
 }
 
@@ -146,6 +164,16 @@ impl Frame<'_> {
         self.of_view(graph, (name, role), 4 * most_words.max(1) as u64, usage, move |view, bytes| {
             put(bytes, 0, &words(view));
         })
+    }
+
+    /// Lets `steps` choose the draws of a pass for each view, among those that it declares.
+    pub fn script_of_view(
+        &self,
+        pass: &mut RasterPass<'_>,
+        steps: impl Fn(&View<'_>) -> Vec<Step> + Send + Sync + 'static,
+    ) {
+        let script = pass.script();
+        self.inputs.scripts.borrow_mut().push(ViewScript { script, steps: Box::new(steps) });
     }
 
     /// Says that what is recorded holds for this view alone: passes or draws that another view has not. A frame of another view is recorded

@@ -37,9 +37,9 @@ pub use afterlight_gpu as gpu;
 pub use afterlight_roles::{BufferRole, PassRole, PassWork};
 
 pub use declare::{
-    Blend, BlendEquation, BufferHandle, ComputePass, ConstantBits, DepthTest, Draw, DrawCall, Graph, Handle,
-    ImageHandle, ImageInfo, Load, RasterPass, RasterState, Rect, ResourceId, StencilFace, StencilTest,
-    Subresource, VertexAttribute, VertexLayout, VertexStream,
+    Blend, BlendEquation, BufferHandle, Commands, ComputePass, ConstantBits, DepthTest, Draw, DrawCall,
+    Graph, Handle, ImageHandle, ImageInfo, Load, RasterPass, RasterState, Rect, ResourceId, ScriptId,
+    StencilFace, StencilTest, Step, Subresource, VertexAttribute, VertexLayout, VertexStream,
 };
 pub use error::GraphError;
 pub use execute::{Executor, FrameSlot, FrameTimes, ResourceKey};

@@ -223,6 +223,10 @@ impl Flight<'_> {
                 self.new_place()?
             }
         };
+        if !self.prepared.scripts.is_empty() {
+            self.prepared.choose_draws();
+            self.prepared.executor.record_again(&mut place.slot)?;
+        }
         let view = self.prepared.viewed.view();
         for (i, input) in self.prepared.inputs.iter().enumerate() {
             place.slot.write(i, |bytes| input.fill(&view, bytes))?;

@@ -6,7 +6,7 @@ use afterlight_graph::{Executor, FrameReport, ResourceId, gpu};
 use afterlight_scene::Camera;
 
 use afterlight_frame::{
-    CameraView, LightPairs, SceneLights, Settings, TechniqueError, View, ViewInput, ViewInputs,
+    CameraView, LightPairs, SceneLights, Settings, TechniqueError, View, ViewInput, ViewInputs, ViewScript,
     capacity::{Capacities, Counter, Demand},
     scene::{SceneGpu, draw_list::DrawChoice},
     views,
@@ -66,7 +66,8 @@ pub struct Prepared {
     pub(crate) executor: Executor,
     pub(crate) viewed: Viewed,
     pub(crate) inputs: Vec<ViewInput>,
-    /// Whether the inputs are all that depends on the view.
+    pub(crate) scripts: Vec<ViewScript>,
+    /// Whether the inputs and scripts are all that depends on the view.
     pub(crate) shows_all_views: bool,
     pub(crate) capacities: Capacities,
     pub(crate) demands: Vec<Demand>,
@@ -85,17 +86,36 @@ impl Prepared {
         kept: Kept,
         draw_calls: u32,
     ) -> Result<Self, TechniqueError> {
-        let (inputs, shows_all_views) = inputs.into_parts();
+        let (inputs, scripts, shows_all_views) = inputs.into_parts();
         let demands = capacities.demands();
         let device = device.clone();
-        let prepared =
-            Self { device, executor, viewed, inputs, shows_all_views, capacities, demands, kept, draw_calls };
+        let mut prepared = Self {
+            device,
+            executor,
+            viewed,
+            inputs,
+            scripts,
+            shows_all_views,
+            capacities,
+            demands,
+            kept,
+            draw_calls,
+        };
         prepared.fill_inputs()?;
         Ok(prepared)
     }
 
+    /// Chooses the draws of scripts for the view.
+    pub(crate) fn choose_draws(&mut self) {
+        let view = self.viewed.view();
+        for script in &self.scripts {
+            self.executor.set_script(script.script, script.steps(&view));
+        }
+    }
+
     /// Writes the inputs for the view.
-    fn fill_inputs(&self) -> Result<(), TechniqueError> {
+    fn fill_inputs(&mut self) -> Result<(), TechniqueError> {
+        self.choose_draws();
         let mut uploader = self.device.uploader()?;
         let mut bytes = Vec::new();
         for input in &self.inputs {

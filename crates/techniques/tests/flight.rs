@@ -67,7 +67,13 @@ fn options() -> FlightOptions {
 }
 
 /// Pictures of a technique from each camera alone.
-fn alone(stage: &Stage, technique: &dyn Technique, params: &Params, samples: u32, path: &[Camera]) -> Vec<Rgba8Image> {
+fn alone(
+    stage: &Stage,
+    technique: &dyn Technique,
+    params: &Params,
+    samples: u32,
+    path: &[Camera],
+) -> Vec<Rgba8Image> {
     let of = |camera: &Camera| {
         let mut settings = stage.from(camera.clone(), SIZE, LIGHTS);
         settings.samples = samples;
@@ -92,9 +98,12 @@ fn every_frame_is_the_picture_of_its_view() {
             let mut flight = renderer
                 .fly(*technique, &Params::default(), &cameras[0], options())
                 .unwrap_or_else(|e| panic!("{id}: {e}"));
-            let (pictures, _) = flown(&mut flight, &cameras);
+            assert!(flight.moves_without_plans(), "{id} at {samples} samples");
+            let (pictures, events) = flown(&mut flight, &cameras);
+            assert!(!events.concat().contains(&Event::Planned), "{id} at {samples} samples");
             let alone = alone(&stage, *technique, &Params::default(), samples, &cameras);
-            let off: Vec<_> = unlike(&pictures, &alone).into_iter().filter(|(_, db)| *db < UNORDERED_DB).collect();
+            let off: Vec<_> =
+                unlike(&pictures, &alone).into_iter().filter(|(_, db)| *db < UNORDERED_DB).collect();
             assert!(off.is_empty(), "{id} at {samples} samples: frames and dB {off:?}");
             // The mutant: every frame with the constants of the frame before.
             let mut late = pictures.clone();
@@ -135,7 +144,8 @@ fn a_view_that_needs_far_more_than_the_last_is_drawn_again_or_told() {
             renderer.fly(technique, &params, &nothing, options()).unwrap_or_else(|e| panic!("{id}: {e}"));
         let (pictures, events) = flown(&mut flight, &cameras);
         let alone = alone(&stage, technique, &params, samples, &cameras);
-        let off: Vec<_> = unlike(&pictures, &alone).into_iter().filter(|(_, db)| *db < UNORDERED_DB).collect();
+        let off: Vec<_> =
+            unlike(&pictures, &alone).into_iter().filter(|(_, db)| *db < UNORDERED_DB).collect();
         assert!(off.is_empty(), "{id}: frames and dB {off:?}");
         assert!(events[2].contains(&Event::DrawnAgain), "{id}: {events:?}");
         assert!(events[0].is_empty() && events[6].is_empty(), "{id}: {events:?}");

@@ -21,6 +21,8 @@ pub struct Graph {
     pub(crate) resources: Vec<ResourceNode>,
     pub(crate) passes: Vec<PassNode>,
     pub(crate) errors: Vec<GraphError>,
+    /// Scripts so far.
+    pub(crate) scripts: u32,
 }
 
 impl Default for Graph {
@@ -37,6 +39,7 @@ impl Graph {
             resources: Vec::new(),
             passes: Vec::new(),
             errors: Vec::new(),
+            scripts: 0,
         }
     }
 

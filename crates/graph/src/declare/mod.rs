@@ -16,6 +16,7 @@ mod image_info;
 mod nodes;
 mod raster_pass;
 mod raster_state;
+mod script;
 mod slots;
 mod transfer;
 mod vertex;
@@ -33,4 +34,5 @@ pub(crate) use nodes::{
 };
 pub use raster_pass::{Load, RasterPass};
 pub use raster_state::RasterState;
+pub use script::{Commands, ScriptId, Step};
 pub use vertex::{VertexAttribute, VertexLayout, VertexStream};

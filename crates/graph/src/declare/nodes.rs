@@ -9,6 +9,7 @@ use super::handles::ResourceId;
 use super::image_info::{ImageInfo, Subresource};
 use super::raster_pass::Load;
 use super::raster_state::RasterState;
+use super::script::ScriptId;
 
 #[derive(Clone)]
 pub(crate) enum ResourceKind {
@@ -143,6 +144,8 @@ pub(crate) struct RasterNode {
     pub extent: Option<(u32, u32)>,
     /// Viewport in pixels: x, y, width, height; `None` is the attachments' extent.
     pub viewport: Option<[f32; 4]>,
+    /// The script that makes the draws; `None` makes each once, in order.
+    pub script: Option<ScriptId>,
 }
 
 #[derive(Clone, Copy)]

@@ -3,6 +3,8 @@
 use afterlight_gpu::{self as gpu, vk};
 use afterlight_roles::{PassRole, PassWork};
 
+use crate::declare::ScriptId;
+
 /// Barriers ready to be recorded: one for all memory, one for each part of an image that changes its layout.
 #[derive(Default)]
 pub(super) struct BarrierList {
@@ -102,6 +104,7 @@ pub(super) enum Body {
         depth: Option<DepthTarget>,
         pipelines: Vec<Bindings>,
         commands: Vec<BoundCommand>,
+        script: Option<ScriptId>,
     },
     Compute {
         bindings: Bindings,

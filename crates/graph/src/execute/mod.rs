@@ -18,6 +18,7 @@ use std::time::Instant;
 
 use afterlight_gpu::{self as gpu, Device, vk};
 
+use crate::declare::{ScriptId, Step};
 use crate::error::GraphError;
 use crate::plan::Plan;
 use crate::report::{FrameReport, PassReport, ResourceReport};
@@ -36,6 +37,8 @@ pub struct Executor {
     passes: Vec<BoundPass>,
     final_barriers: BarrierList,
     memory: Vec<ResourceReport>,
+    /// Steps of the plan's scripts.
+    scripts: Vec<Vec<Step>>,
 }
 
 impl Executor {
@@ -61,12 +64,22 @@ impl Executor {
                 output: resource.output,
             })
             .collect();
-        Ok(Self { device: device.clone(), physical, passes, final_barriers, memory, plan })
+        let scripts = vec![Vec::new(); plan.scripts as usize];
+        Ok(Self { device: device.clone(), physical, passes, final_barriers, memory, plan, scripts })
     }
 
     /// Returns the plan.
     pub fn plan(&self) -> &Plan {
         &self.plan
+    }
+
+    /// Says which draws a script's pass makes from now on, in which order. Frames that were recorded before ([`Executor::slot`]) keep their
+    /// steps until [`Executor::record_again`].
+    ///
+    /// # Panics
+    /// If the script is of another graph with more of them.
+    pub fn set_script(&mut self, script: ScriptId, steps: Vec<Step>) {
+        self.scripts[script.0 as usize] = steps;
     }
 
     /// Records all passes.
@@ -79,7 +92,7 @@ impl Executor {
             pass.barriers.record(encoder);
             // A query spans the whole of a rendering scope: it may neither begin nor end within.
             let query = encoder.begin_statistics()?;
-            pass.body.record(encoder)?;
+            pass.body.record(encoder, &self.scripts)?;
             encoder.end_statistics(query);
             encoder.end_label();
             times.push(encoder.timestamp(vk::PipelineStageFlags2::ALL_COMMANDS)?);

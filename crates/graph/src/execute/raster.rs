@@ -110,6 +110,7 @@ impl Builder<'_> {
             depth: node.depth.as_ref().map(|depth| self.depth_target(pass, depth)).transpose()?,
             pipelines: bound,
             commands,
+            script: node.script,
         })
     }
 
@@ -171,7 +172,7 @@ pub(super) fn clear_color(format: vk::Format, color: [f32; 4]) -> gpu::ClearColo
 }
 
 /// A rectangle cut to the attachment, as Vulkan wants it.
-fn rect_2d(rect: Rect, extent: [u32; 2]) -> vk::Rect2D {
+pub(super) fn rect_2d(rect: Rect, extent: [u32; 2]) -> vk::Rect2D {
     let (x, y) = (rect.x_px.min(extent[0]), rect.y_px.min(extent[1]));
     vk::Rect2D {
         offset: vk::Offset2D { x: x.cast_signed(), y: y.cast_signed() },

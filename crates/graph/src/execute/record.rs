@@ -2,6 +2,9 @@
 
 use afterlight_gpu::{self as gpu, GpuError, vk};
 
+use super::raster::rect_2d;
+use crate::declare::{Commands, Rect, Step};
+
 use super::commands::{
     BarrierList, Bindings, Body, BoundCall, BoundCommand, BoundDispatch, ColorTarget, DepthTarget,
     DrawCommand,
@@ -36,25 +39,48 @@ impl Bindings {
 }
 
 impl Body {
-    pub(super) fn record(&self, encoder: &mut gpu::Encoder) -> Result<(), GpuError> {
+    /// `scripts` holds the steps of each script.
+    pub(super) fn record(&self, encoder: &mut gpu::Encoder, scripts: &[Vec<Step>]) -> Result<(), GpuError> {
         match self {
-            Body::Raster { extent, viewport, layers, colors, depth, pipelines, commands } => {
+            Body::Raster { extent, viewport, layers, colors, depth, pipelines, commands, script } => {
                 begin(encoder, *extent, *layers, colors, depth.as_ref());
                 if let Some(rect_px) = viewport {
                     encoder.set_viewport(*rect_px, [0.0, 1.0]);
                 }
                 let mut bound = usize::MAX;
-                for command in commands {
-                    match command {
-                        BoundCommand::ClearStencil { value, rect } => {
-                            encoder.clear_stencil(*value, *rect, *layers)
-                        }
-                        BoundCommand::Draw(draw) => {
-                            if bound != draw.pipeline {
-                                pipelines[draw.pipeline].record(encoder);
-                                bound = draw.pipeline;
+                let mut make = |encoder: &mut gpu::Encoder, draw: &DrawCommand, changed: &Changed| {
+                    if bound != draw.pipeline {
+                        pipelines[draw.pipeline].record(encoder);
+                        bound = draw.pipeline;
+                    }
+                    draw.record(encoder, changed);
+                };
+                match script {
+                    None => {
+                        for command in commands {
+                            match command {
+                                BoundCommand::ClearStencil { value, rect } => {
+                                    encoder.clear_stencil(*value, *rect, *layers)
+                                }
+                                BoundCommand::Draw(draw) => make(encoder, draw, &Changed::default()),
                             }
-                            draw.record(encoder);
+                        }
+                    }
+                    Some(script) => {
+                        let steps = scripts.get(script.0 as usize).map_or(&[][..], Vec::as_slice);
+                        for step in steps {
+                            match *step {
+                                Step::ClearStencil(value) => {
+                                    encoder.clear_stencil(value, rect_2d(whole(*extent), *extent), *layers);
+                                }
+                                Step::Draw { draw, scissor, stencil_reference, push, commands: range } => {
+                                    let scissor = scissor.map(|rect| rect_2d(rect, *extent));
+                                    let changed = Changed { scissor, stencil_reference, push, range };
+                                    if let Some(BoundCommand::Draw(draw)) = commands.get(draw as usize) {
+                                        make(encoder, draw, &changed);
+                                    }
+                                }
+                            }
                         }
                     }
                 }
@@ -124,16 +150,35 @@ fn begin(
     });
 }
 
+/// What a script changes of a draw.
+#[derive(Default)]
+pub(super) struct Changed {
+    scissor: Option<vk::Rect2D>,
+    stencil_reference: Option<u32>,
+    push: Option<u32>,
+    range: Option<Commands>,
+}
+
+/// The whole of an attachment.
+fn whole([width_px, height_px]: [u32; 2]) -> Rect {
+    Rect { x_px: 0, y_px: 0, width_px, height_px }
+}
+
 impl DrawCommand {
-    pub(super) fn record(&self, encoder: &mut gpu::Encoder) {
-        encoder.set_scissor(self.scissor);
+    pub(super) fn record(&self, encoder: &mut gpu::Encoder, changed: &Changed) {
+        encoder.set_scissor(changed.scissor.unwrap_or(self.scissor));
         encoder.set_cull_mode(self.cull);
         encoder.set_front_face(self.front_face);
         if self.depth_bias_slope != 0.0 {
             encoder.set_depth_bias(0.0, 0.0, self.depth_bias_slope);
         }
-        encoder.set_stencil_reference(self.stencil_reference);
+        encoder.set_stencil_reference(changed.stencil_reference.unwrap_or(self.stencil_reference));
         encoder.push_constants(&self.push);
+        if let Some(word) = changed.push
+            && !self.push.is_empty()
+        {
+            encoder.push_constants(&word.to_ne_bytes());
+        }
         if !self.vertex_buffers.is_empty() {
             let buffers: Vec<(&gpu::Buffer, u64)> =
                 self.vertex_buffers.iter().map(|buffer| (buffer, 0)).collect();
@@ -153,14 +198,9 @@ impl DrawCommand {
                 encoder.draw_indexed_indirect(buffer, *offset, *count, *stride);
             }
             BoundCall::IndexedIndirectCount { buffer, offset, count_buffer, count_offset, max, stride } => {
-                encoder.draw_indexed_indirect_count(
-                    buffer,
-                    *offset,
-                    count_buffer,
-                    *count_offset,
-                    *max,
-                    *stride,
-                );
+                let declared = Commands { offset: *offset, count_offset: *count_offset, max: *max };
+                let Commands { offset, count_offset, max } = changed.range.unwrap_or(declared);
+                encoder.draw_indexed_indirect_count(buffer, offset, count_buffer, count_offset, max, *stride);
             }
         }
     }

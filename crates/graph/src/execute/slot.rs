@@ -64,14 +64,8 @@ pub struct FrameTimes {
 
 /// A frame of an [`Executor`] that waits for its next submission, or is in flight.
 pub struct FrameSlot {
-    recording: gpu::Recording,
-    marks: Marks,
-    start: gpu::TimestampId,
-    end: gpu::TimestampId,
-    written: Option<gpu::Buffer>,
-    inputs: Vec<Place>,
-    read: Option<gpu::Buffer>,
-    outputs: Vec<Place>,
+    ends: Ends,
+    recorded: Recorded,
     completed: gpu::Completed,
     times: FrameTimes,
 }
@@ -101,20 +95,37 @@ impl Executor {
             copies.push((copy, place));
         }
         let read = places.buffer(&self.device, "frame outputs", gpu::MemoryKind::Readback)?;
+        let inputs = inputs.iter().cloned().zip(inputs_at).collect();
+        let ends = Ends { written, inputs, read, outputs: copies };
+        let recorded = self.record_between(&ends)?;
+        let (completed, times) = (gpu::Completed::default(), FrameTimes::default());
+        Ok(FrameSlot { ends, recorded, completed, times })
+    }
 
+    /// Records the frame of a slot anew, with the scripts as they are now. Waits for its last submission.
+    ///
+    /// # Errors
+    /// The device was lost, a recording that it refuses.
+    pub fn record_again(&self, slot: &mut FrameSlot) -> Result<(), GraphError> {
+        slot.recorded.recording.wait()?;
+        slot.recorded = self.record_between(&slot.ends)?;
+        Ok(())
+    }
+
+    fn record_between(&self, ends: &Ends) -> Result<Recorded, GraphError> {
         let mut encoder = self.device.encoder_for_many()?;
         after_earlier_frames(&mut encoder);
         let start = encoder.timestamp(vk::PipelineStageFlags2::ALL_COMMANDS)?;
-        if let Some(written) = &written {
-            for (input, place) in inputs.iter().zip(&inputs_at) {
+        if let Some(written) = &ends.written {
+            for (input, place) in &ends.inputs {
                 encoder.copy_buffer(written, place.offset, input, 0, place.bytes)?;
             }
             encoder.barriers(&[gpu::MemoryBarrier { before: ANY_WRITE, after: ANY }], &[], &[]);
         }
         let marks = self.record(&mut encoder)?;
-        if let Some(read) = &read {
+        if let Some(read) = &ends.read {
             encoder.barriers(&[gpu::MemoryBarrier { before: ANY_WRITE, after: COPY_READ }], &[], &[]);
-            for (copy, place) in &copies {
+            for (copy, place) in &ends.outputs {
                 match copy {
                     Copied::Buffer(buffer) => {
                         encoder.copy_buffer(buffer, 0, read, place.offset, place.bytes)?
@@ -124,19 +135,24 @@ impl Executor {
             }
         }
         let end = encoder.timestamp(vk::PipelineStageFlags2::ALL_COMMANDS)?;
-        Ok(FrameSlot {
-            recording: encoder.finish()?,
-            marks,
-            start,
-            end,
-            written,
-            inputs: inputs_at,
-            read,
-            outputs: places.all,
-            completed: gpu::Completed::default(),
-            times: FrameTimes::default(),
-        })
+        Ok(Recorded { recording: encoder.finish()?, marks, start, end })
     }
+}
+
+/// What the host writes before a frame and reads after it.
+struct Ends {
+    written: Option<gpu::Buffer>,
+    inputs: Vec<(gpu::Buffer, Place)>,
+    read: Option<gpu::Buffer>,
+    outputs: Vec<(Copied, Place)>,
+}
+
+/// A frame's commands, and the times that they take.
+struct Recorded {
+    recording: gpu::Recording,
+    marks: Marks,
+    start: gpu::TimestampId,
+    end: gpu::TimestampId,
 }
 
 /// What is copied at the end of a frame.
@@ -166,9 +182,9 @@ impl FrameSlot {
     /// # Errors
     /// The device was lost.
     pub fn write(&mut self, input: usize, write: impl FnOnce(&mut [u8])) -> Result<(), GraphError> {
-        self.recording.wait()?;
-        let place = self.inputs[input];
-        let Some(written) = &self.written else { return Ok(()) };
+        self.recorded.recording.wait()?;
+        let place = self.ends.inputs[input].1;
+        let Some(written) = &self.ends.written else { return Ok(()) };
         let [from, end] = [place.offset, place.offset + place.bytes].map(|at| at as usize);
         Ok(written.with_mapped_mut(|bytes| write(&mut bytes[from..end]))?)
     }
@@ -178,7 +194,7 @@ impl FrameSlot {
     /// # Errors
     /// The device was lost.
     pub fn submit(&mut self) -> Result<(), GraphError> {
-        Ok(self.recording.submit()?)
+        Ok(self.recorded.recording.submit()?)
     }
 
     /// Whether the device has nothing of the frame left to do.
@@ -186,7 +202,7 @@ impl FrameSlot {
     /// # Errors
     /// The device was lost.
     pub fn is_done(&self) -> Result<bool, GraphError> {
-        Ok(self.recording.is_done()?)
+        Ok(self.recorded.recording.is_done()?)
     }
 
     /// Waits for the last submission and returns its times.
@@ -194,10 +210,10 @@ impl FrameSlot {
     /// # Errors
     /// The device was lost.
     pub fn finish(&mut self) -> Result<&FrameTimes, GraphError> {
-        self.recording.collect(&mut self.completed)?;
-        let (completed, times) = (&self.completed, &self.marks.times);
-        self.times.start_ns = completed.ns(self.start);
-        let whole_ns = completed.elapsed_ns(self.start, self.end);
+        self.recorded.recording.collect(&mut self.completed)?;
+        let (completed, times) = (&self.completed, &self.recorded.marks.times);
+        self.times.start_ns = completed.ns(self.recorded.start);
+        let whole_ns = completed.elapsed_ns(self.recorded.start, self.recorded.end);
         self.times.end_ns = self.times.start_ns.zip(whole_ns).map(|(start_ns, whole_ns)| start_ns + whole_ns);
         self.times.frame_ns = completed.elapsed_ns(times[0], times[times.len() - 1]);
         self.times.pass_ns.clear();
@@ -210,10 +226,10 @@ impl FrameSlot {
     /// # Errors
     /// The device was lost.
     pub fn read<T>(&mut self, output: usize, read: impl FnOnce(&[u8]) -> T) -> Result<T, GraphError> {
-        self.recording.wait()?;
-        let place = self.outputs[output];
+        self.recorded.recording.wait()?;
+        let place = self.ends.outputs[output].1;
         let [from, end] = [place.offset, place.offset + place.bytes].map(|at| at as usize);
-        match &self.read {
+        match &self.ends.read {
             Some(buffer) => Ok(buffer.with_mapped_mut(|bytes| read(&bytes[from..end]))?),
             None => Ok(read(&[])),
         }
@@ -221,6 +237,6 @@ impl FrameSlot {
 
     /// Bytes that the slot holds beside the plan, which all slots share.
     pub fn bytes(&self) -> u64 {
-        [&self.written, &self.read].into_iter().flatten().map(gpu::Buffer::allocated_bytes).sum()
+        [&self.ends.written, &self.ends.read].into_iter().flatten().map(gpu::Buffer::allocated_bytes).sum()
     }
 }

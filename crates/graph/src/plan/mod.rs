@@ -97,6 +97,8 @@ pub struct Plan {
     pub final_barriers: Vec<Barrier>,
     /// Names of passes that were dropped since nobody uses their results.
     pub dropped: Vec<String>,
+    /// Number of scripts, see [`Step`](crate::Step).
+    pub scripts: u32,
     /// Slots that a pass binds for reading and none of its shaders has, as `pass: slot`.
     pub unused_slots: Vec<String>,
 }

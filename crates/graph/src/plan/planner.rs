@@ -61,6 +61,7 @@ impl Graph {
             heaps,
             final_barriers,
             dropped: Vec::new(),
+            scripts: self.scripts,
             unused_slots: Vec::new(),
         };
         for ((node, resolved), live) in self.passes.into_iter().zip(resolved).zip(live) {

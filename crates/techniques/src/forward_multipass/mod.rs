@@ -7,15 +7,15 @@ mod params;
 pub use params::{ForwardMultipassParams, Scissor};
 
 use afterlight_graph::{
-    Blend, BufferRole, DepthTest, Graph, ImageHandle, Load, PassRole, RasterPass, Rect, gpu::vk,
+    Blend, BufferRole, DepthTest, Graph, ImageHandle, Load, PassRole, RasterPass, Rect, Step, gpu::vk,
 };
 use afterlight_scene::Aabb;
 use glam::Vec3;
 
 use afterlight_cost::{Cost, Workload};
 use afterlight_frame::{
-    Answers, AppendixA, Exactness, Frame, Info, OpaqueDepth, Params, Source, Technique, TechniqueError,
-    camera_view::screen_rect,
+    Answers, AppendixA, Exactness, Frame, Info, OpaqueDepth, Params, Source, Technique, TechniqueError, View,
+    camera_view::screen_rect, scene::BUCKETS,
 };
 use afterlight_shader::Shader;
 use afterlight_stages::surfaces::{depth_first::FIRST_FRAGMENT, geometry::SceneDraws};
@@ -114,30 +114,42 @@ fn draw_lights(frame: &Frame<'_>, pass: &mut RasterPass<'_>) -> Result<(), Techn
             .depth(DepthTest::EQUAL)
             .stencil(FIRST_FRAGMENT, 1)
             .blend(vec![Blend::ADD]);
-    let whole = Rect { x_px: 0, y_px: 0, width_px: frame.width_px, height_px: frame.height_px };
+    surfaces.push = bytemuck::bytes_of(&0u32).to_vec();
+    surfaces.draw(frame, pass);
+    let buckets = (0..BUCKETS)
+        .filter(|b| frame.scene.bucket_first[*b] < frame.scene.bucket_first[b + 1])
+        .count() as u32;
     let by_light = frame.params.typed::<ForwardMultipassParams>().scissor == Scissor::Light;
-    if by_light {
-        frame.holds_for_this_view();
-    }
-    for index in 0..frame.lights.count {
-        if index > 0 && index % STENCIL_REFERENCES == 0 {
-            pass.clear_stencil(0, None);
+    frame.script_of_view(pass, move |view| {
+        let mut steps = Vec::new();
+        for index in 0..view.lights.count {
+            if index > 0 && index % STENCIL_REFERENCES == 0 {
+                steps.push(Step::ClearStencil(0));
+            }
+            if let Some(scissor) = reached(view, index, by_light) {
+                steps.extend((0..buckets).map(|draw| Step::Draw {
+                    draw,
+                    scissor: Some(scissor),
+                    stencil_reference: Some(index % STENCIL_REFERENCES + 1),
+                    push: Some(index),
+                    commands: None,
+                }));
+            }
         }
-        surfaces.stencil_reference = index % STENCIL_REFERENCES + 1;
-        surfaces.push = bytemuck::bytes_of(&index).to_vec();
-        let light = &frame.lights.lights[index as usize];
-        let bounded = by_light && index >= frame.lights.unbounded_count;
-        let scissor = if bounded {
-            let range = Vec3::splat(light.range_m);
-            let bounds = Aabb { min: light.position_ws - range, max: light.position_ws + range };
-            screen_rect(frame.clip_from_world, &bounds, whole)
-        } else {
-            Some(whole)
-        };
-        if let Some(scissor) = scissor {
-            surfaces.scissor = Some(scissor);
-            surfaces.draw(frame, pass);
-        }
-    }
+        steps
+    });
     Ok(())
+}
+
+/// Pixels that a light may reach: all of them unless `by_light`; `None` where it reaches none.
+fn reached(view: &View<'_>, index: u32, by_light: bool) -> Option<Rect> {
+    let whole =
+        Rect { x_px: 0, y_px: 0, width_px: view.settings.width_px, height_px: view.settings.height_px };
+    if !by_light || index < view.lights.unbounded_count {
+        return Some(whole);
+    }
+    let light = &view.lights.lights[index as usize];
+    let range = Vec3::splat(light.range_m);
+    let bounds = Aabb { min: light.position_ws - range, max: light.position_ws + range };
+    screen_rect(view.camera.clip_from_world, &bounds, whole)
 }

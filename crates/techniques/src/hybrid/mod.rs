@@ -5,14 +5,15 @@
 pub mod cost;
 
 use afterlight_graph::{
-    Blend, BufferHandle, BufferRole, DepthTest, Graph, ImageHandle, Load, PassRole, RasterPass, StencilFace,
-    StencilTest, gpu::vk,
+    Blend, BufferHandle, BufferRole, Commands, DepthTest, Graph, ImageHandle, Load, PassRole, RasterPass,
+    StencilFace, StencilTest, Step, gpu::vk,
 };
 
 use crate::light_prepass::{self, SUMS};
 use afterlight_cost::{Cost, Workload};
 use afterlight_frame::{
-    Answers, AppendixA, Exactness, Frame, Info, Need, Params, Source, Technique, TechniqueError,
+    Answers, AppendixA, Exactness, Frame, Info, Need, Params, Source, Technique, TechniqueError, View,
+    scene::{BUCKETS, Bucket, draw_list::COMMAND_BYTES},
 };
 use afterlight_shader::Shader;
 use afterlight_stages::surfaces::{
@@ -85,30 +86,82 @@ const COLORED: u32 = 1;
 /// Stencil of a pixel whose surface is to be drawn again.
 const COLORLESS: u32 = 0;
 
-/// The draws in view, in order.
+/// The draws in view, which take one path or the other.
 struct Draws {
-    runs: Vec<Run>,
+    params: HybridParams,
     /// Length of each run.
     counts: BufferHandle,
 }
 
+/// The draws of a view as runs of one path.
+fn runs(params: HybridParams, view: &View<'_>) -> Vec<Run> {
+    match params.path {
+        PathChoice::Deferred => paths::one_path(view, Path::Deferred),
+        PathChoice::Prepass => paths::one_path(view, Path::Prepass),
+        PathChoice::Predicted => paths::predicted(view, params.prepass_weight),
+    }
+}
+
 impl Draws {
-    fn take(&self, path: Path) -> bool {
-        self.runs.iter().any(|run| run.path == path)
+    fn new(graph: &mut Graph, frame: &Frame<'_>, params: HybridParams) -> Result<Self, TechniqueError> {
+        // There are no more runs than draws.
+        let most = frame.scene.draw_infos.len();
+        let named = ("hybrid draw counts", BufferRole::Scene);
+        let counts = frame.table_of_view(graph, named, most, move |view| {
+            runs(params, view).iter().map(|run| run.places.len() as u32).collect()
+        })?;
+        Ok(Self { params, counts })
     }
 
-    /// Adds all draws to a pass, each path's as said; `None` leaves them out.
-    fn draw<'s>(
+    /// Whether some view has draws on a path.
+    fn may_take(&self, path: Path) -> bool {
+        match self.params.path {
+            PathChoice::Deferred => path == Path::Deferred,
+            PathChoice::Prepass => path == Path::Prepass,
+            PathChoice::Predicted => true,
+        }
+    }
+
+    /// Lets a pass make the draws of each view in their order, each path's as said; `None` leaves them out. What the pass has declared
+    /// before is made first.
+    fn draw(
         &self,
         frame: &Frame<'_>,
         pass: &mut RasterPass<'_>,
-        surfaces: impl Fn(Path) -> Option<&'s SceneDraws>,
+        first_draws: u32,
+        surfaces: [(Path, Option<&SceneDraws>); 2],
     ) {
-        for (i, run) in self.runs.iter().enumerate() {
-            if let Some(surfaces) = surfaces(run.path) {
-                surfaces.draw_some(frame, pass, (run.bucket, &run.places), (&self.counts, i));
+        // A draw for each path and bucket of the scene, numbered from 0.
+        let mut numbered = Vec::new();
+        for (path, surfaces) in surfaces.into_iter().filter_map(|(path, surfaces)| Some((path, surfaces?))) {
+            for bucket in (0..BUCKETS).map(Bucket) {
+                let [first, end] = [bucket.0, bucket.0 + 1].map(|place| frame.scene.bucket_first[place]);
+                if first < end {
+                    surfaces.draw_some(frame, pass, (bucket, &(0..end - first)), (&self.counts, 0));
+                    numbered.push((path, bucket));
+                }
             }
         }
+        let params = self.params;
+        frame.script_of_view(pass, move |view| {
+            let step = |(i, run): (usize, Run)| {
+                let number = numbered.iter().position(|one| *one == (run.path, run.bucket))?;
+                let first = view.scene.bucket_first[run.bucket.0] + run.places.start;
+                Some(Step::Draw {
+                    draw: first_draws + number as u32,
+                    scissor: None,
+                    stencil_reference: None,
+                    push: None,
+                    commands: Some(Commands {
+                        offset: COMMAND_BYTES * u64::from(first),
+                        count_offset: 4 * i as u64,
+                        max: run.places.end - run.places.start,
+                    }),
+                })
+            };
+            let first = (0..first_draws).map(Step::draw);
+            first.chain(runs(params, view).into_iter().enumerate().filter_map(step)).collect()
+        });
     }
 }
 
@@ -138,16 +191,7 @@ impl Technique for Hybrid {
     }
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
-        let HybridParams { path, prepass_weight } = *frame.params.typed();
-        frame.holds_for_this_view();
-        let runs = match path {
-            PathChoice::Deferred => paths::one_path(frame, Path::Deferred),
-            PathChoice::Prepass => paths::one_path(frame, Path::Prepass),
-            PathChoice::Predicted => paths::predicted(frame, prepass_weight),
-        };
-        let lengths: Vec<u32> = runs.iter().map(|run| run.places.len() as u32).collect();
-        let counts = frame.table(graph, "hybrid draw counts", BufferRole::Scene, &lengths)?;
-        let draws = Draws { runs, counts };
+        let draws = Draws::new(graph, frame, *frame.params.typed())?;
         let filled = fill(graph, frame, &draws)?;
         let surfaces = [&filled.depth, &filled.normal, &filled.roughness];
         let sums = light_prepass::gather_lights(graph, frame, INFO.id, surfaces)?;
@@ -168,7 +212,7 @@ fn fill(graph: &mut Graph, frame: &Frame<'_>, draws: &Draws) -> Result<GBuffer, 
     lobe.blend = vec![Blend::NONE, Blend::NONE, Blend::REPLACE, Blend::REPLACE];
     Ok(gbuffer::fill_by(graph, frame, INFO.id, frame.depth_stencil_format(), |pass| {
         pass.stencil_clear(COLORLESS);
-        draws.draw(frame, pass, |path| Some(if path == Path::Deferred { &whole } else { &lobe }));
+        draws.draw(frame, pass, 0, [(Path::Deferred, Some(&whole)), (Path::Prepass, Some(&lobe))]);
     }))
 }
 
@@ -192,10 +236,16 @@ fn apply_materials(
     pass.read("gbuffer_base_color", &filled.base_color);
     let radiance = pass.color(filled.accumulation, Load::Keep);
     let _depth = pass.stencil(filled.depth, Load::Keep);
-    if draws.take(Path::Deferred) {
+    let composes = draws.may_take(Path::Deferred);
+    if composes {
         compose(frame, &mut pass)?;
     }
-    draws.draw(frame, &mut pass, |path| (path == Path::Prepass).then_some(&again));
+    draws.draw(
+        frame,
+        &mut pass,
+        u32::from(composes),
+        [(Path::Deferred, None), (Path::Prepass, Some(&again))],
+    );
     pass.finish();
     Ok(radiance)
 }

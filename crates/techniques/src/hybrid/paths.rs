@@ -7,7 +7,7 @@ use afterlight_graph::Rect;
 use glam::{Mat4, Vec3};
 
 use afterlight_frame::{
-    Frame,
+    View,
     camera_view::screen_rect,
     scene::{BUCKETS, Bucket, DrawInfo},
 };
@@ -58,19 +58,20 @@ struct Footprint {
 type Span = [f64; 2];
 
 /// All draws in view on one path.
-pub(super) fn one_path(frame: &Frame<'_>, path: Path) -> Vec<Run> {
-    runs(frame.visible.each_ref().map(|draws| vec![path; draws.len()]))
+pub(super) fn one_path(view: &View<'_>, path: Path) -> Vec<Run> {
+    runs(view.visible.each_ref().map(|draws| vec![path; draws.len()]))
 }
 
 /// Every draw in view on the path that is predicted to read and write less; `prepass_weight` is a factor on what the light pre-pass
 /// does.
-pub(super) fn predicted(frame: &Frame<'_>, prepass_weight: f32) -> Vec<Run> {
+pub(super) fn predicted(view: &View<'_>, prepass_weight: f32) -> Vec<Run> {
     let draws: Vec<&DrawInfo> =
-        frame.visible.iter().flatten().map(|draw| &frame.scene.draw_infos[*draw as usize]).collect();
-    let size = [frame.width_px, frame.height_px];
+        view.visible.iter().flatten().map(|draw| &view.scene.draw_infos[*draw as usize]).collect();
+    let size = [view.settings.width_px, view.settings.height_px];
+    let displacement_m = view.settings.effects.tessellation.displacement_m();
     let footprints: Vec<Footprint> = draws
         .iter()
-        .map(|draw| Footprint::new(&draw.bounds_ws, frame.clip_from_world, size, frame.displacement_m))
+        .map(|draw| Footprint::new(&draw.bounds_ws, view.camera.clip_from_world, size, displacement_m))
         .collect();
     let drawn = seen(footprints.iter());
     let mut left = seen(footprints.iter().rev());
@@ -81,7 +82,7 @@ pub(super) fn predicted(frame: &Frame<'_>, prepass_weight: f32) -> Vec<Run> {
         choose(draws[i], fragments, fragments * left[i], f64::from(prepass_weight))
     };
     let mut chosen = (0..draws.len()).map(path);
-    runs(frame.visible.each_ref().map(|bucket| chosen.by_ref().take(bucket.len()).collect()))
+    runs(view.visible.each_ref().map(|bucket| chosen.by_ref().take(bucket.len()).collect()))
 }
 
 /// The path that reads and writes less for a draw of which `fragments` are shaded and `pixels` stay to be seen: the terms of D and of
