@@ -858,3 +858,37 @@ fn verify_ends_with_1_where_a_technique_is_off() {
     let again = run_printed(folder.path(), command, &[]);
     assert_eq!(again.status.code(), Some(1), "{command}: {}", text(&again.stderr));
 }
+
+#[test]
+fn play_tells_how_steady_frames_are() {
+    if !has_device() {
+        return;
+    }
+    let folder = folder();
+    let scene = "builtin:colonnade?triangles=20000&texture=64";
+    let size = ["--width", "80", "--height", "45", "--lights", "5"];
+    let turns = ["play", scene, "--technique", "tiled,visibility", "--switch-every", "3", "--frames", "9"];
+    let output = run_in(folder.path(), &[&turns[..], &size, &["-o", "f%02d.png", "--json", "-"]].concat());
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let played = json(&output);
+    assert_eq!(played["schema"], 1);
+    let techniques = played["techniques"].as_array().expect("a list");
+    let frames: Vec<_> = techniques.iter().map(|one| (one["technique"].clone(), one["frames"].clone())).collect();
+    assert_eq!(frames, [("tiled".into(), 6.into()), ("visibility".into(), 3.into())]);
+    for one in techniques {
+        assert_eq!(one["moves_without_plans"], true);
+        for what in ["gpu_ms", "cpu_ms"] {
+            let times = &one[what];
+            let [median, worst] = ["median", "worst"].map(|key| times[key].as_f64().expect("a time"));
+            assert!(median > 0.0 && worst >= median, "{what}: {times}");
+        }
+    }
+    assert!(played["memory"]["in_flight_bytes"].as_u64().expect("bytes") > 0);
+    assert!((0.0..=1.0).contains(&played["idle_fraction"].as_f64().expect("a fraction")));
+    assert!((0..9).all(|frame| folder.path().join(format!("f{frame:02}.png")).is_file()));
+
+    refused(&["play", "--technique", "backward"], 2, &["backward", "forward"]);
+    refused(&["play", "--technique", "tiled", "--frames", "0"], 2, &["--frames"]);
+    refused(&["play", "--technique", "tiled", "-o", "frames.png"], 2, &["--output", "%04d"]);
+    refused(&["play", "--technique", "tiled", "--in-flight", "9"], 2, &["--in-flight"]);
+}
