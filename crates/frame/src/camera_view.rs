@@ -5,7 +5,7 @@ use afterlight_scene::{Aabb, Camera, Projection};
 use afterlight_shader::structs::FrameConstants;
 use glam::{Mat4, Vec3, Vec4};
 
-use crate::{SceneGpu, SceneLights, Settings, views};
+use crate::{SceneLights, Settings, scene::placed::Placed, views};
 
 /// A camera's matrices for an image size.
 pub struct CameraView {
@@ -20,9 +20,9 @@ pub struct CameraView {
 }
 
 impl CameraView {
-    /// The view of the settings' camera at their width and height, its depths fitted to the scene.
-    pub fn fitted(settings: &Settings, scene: &SceneGpu) -> Self {
-        let bounds_ws = scene.all_bounds_ws(settings.effects.tessellation.displacement_m());
+    /// The view of the settings' camera at their width and height, its depths fitted to all surfaces.
+    pub fn fitted(settings: &Settings, placed: &Placed) -> Self {
+        let bounds_ws = placed.all_bounds_ws(settings.effects.tessellation.displacement_m());
         let (camera, eye_moved_m) = settings.camera.fitted(&bounds_ws);
         Self { eye_moved_m, ..Self::of(&camera, settings) }
     }
@@ -53,13 +53,12 @@ impl CameraView {
         -self.view_from_world.row(2)
     }
 
-    /// What `include/frame.glsl` declares, for this view.
-    pub fn constants(&self, settings: &Settings, lights: &SceneLights, scene: &SceneGpu) -> FrameConstants {
+    /// What `include/frame.glsl` declares, for this view of surfaces within `bounds_ws`.
+    pub fn constants(&self, settings: &Settings, lights: &SceneLights, bounds_ws: &Aabb) -> FrameConstants {
         let distance_from_world = self.distance_from_world();
         let near_m = match self.projection {
             Projection::Perspective { near_m, .. } | Projection::Orthographic { near_m, .. } => near_m,
         };
-        let bounds_ws = scene.bounds_ws(settings.effects.tessellation.displacement_m());
         let to_eye = self.view_from_world.row(2).truncate();
         let (depth_to_distance, eye) = match self.projection {
             Projection::Perspective { near_m, .. } => {
@@ -81,7 +80,7 @@ impl CameraView {
             light_count: lights.count,
             background_radiance: background_radiance(settings).into(),
             unbounded_light_count: lights.unbounded_count,
-            distance_range_m: distance_range_m(&bounds_ws, distance_from_world, near_m),
+            distance_range_m: distance_range_m(bounds_ws, distance_from_world, near_m),
         }
     }
 }

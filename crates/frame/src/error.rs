@@ -35,6 +35,19 @@ pub enum TechniqueError {
     /// A parameter that a technique does not have, or a value out of its range.
     #[error(transparent)]
     Param(#[from] ParamError),
+    /// A motion has turned an instance inside out, so that its draws belong to another bucket.
+    #[error(
+        "instance {instance}: a motion mirrors it; expected one that keeps the hand of its matrix, or the scene uploaded anew"
+    )]
+    TurnedOver {
+        /// The instance, by its number in the scene.
+        instance: u32,
+    },
+    /// Nodes that move in a flight whose nodes were said to stand still.
+    #[error(
+        "nodes of a flight: found matrices of instances, expected none without FlightOptions::nodes_move"
+    )]
+    NodesStandStill,
     /// Something larger than the device takes.
     #[error("{what}: found {found}, expected at most {limit}")]
     TooLarge {

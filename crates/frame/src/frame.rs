@@ -9,7 +9,7 @@ use afterlight_graph::{
 use afterlight_shader::Shader;
 
 use crate::{
-    Board, Params, Slots, TechniqueError, ViewInputs,
+    Board, ChangesWith, Params, Slots, TechniqueError, ViewInputs,
     capacity::Capacities,
     scene::{
         BUCKETS, SceneGpu,
@@ -174,13 +174,13 @@ impl Frame<'_> {
         name: &str,
         rows: Range<u32>,
     ) -> Result<DrawCommands, TechniqueError> {
-        self.inputs.declare_draws(self.device, graph, name, self.scene, move |view| {
+        self.inputs.declare_draws(self.device, graph, (name, ChangesWith::Camera), self.scene, move |view| {
             let settings = view.settings;
             let rows = Rows::new(view.camera.clip_from_world, rows.clone(), settings.height_px);
-            let displacement_m = settings.effects.tessellation.displacement_m();
+            let displacement_m = view.displacement_m();
             Cow::Owned(view.visible.each_ref().map(|visible| {
                 let infos = visible.iter().filter(|draw| {
-                    rows.touch(&displaced(&view.scene.draw_infos[**draw as usize].bounds_ws, displacement_m))
+                    rows.touch(&displaced(&view.placed.infos[**draw as usize].bounds_ws, displacement_m))
                 });
                 infos.copied().collect::<Vec<u32>>()
             }))

@@ -6,15 +6,18 @@ use std::{
 };
 
 use afterlight_graph::{
-    BufferHandle, BufferRole, Graph, RasterPass, ScriptId, Step,
+    BufferHandle, BufferRole, FrameInput, Graph, ImageHandle, RasterPass, ScriptId, Step,
     gpu::{self, vk},
 };
+
+use afterlight_scene::Aabb;
 
 use crate::{
     CameraView, DrawCommands, Frame, SceneGpu, SceneLights, Settings, TechniqueError,
     scene::{
         BUCKETS,
         draw_list::{COMMAND_BYTES, write_commands, write_counts},
+        placed::Placed,
     },
 };
 
@@ -30,15 +33,40 @@ pub struct View<'a> {
     pub lights: &'a SceneLights,
     /// Draws in view, by bucket, in drawing order.
     pub visible: &'a [Vec<u32>; BUCKETS],
+    /// Where surfaces stand.
+    pub placed: &'a Placed,
+}
+
+impl View<'_> {
+    /// How far displacement moves surfaces along each axis at most, m.
+    pub fn displacement_m(&self) -> f32 {
+        self.settings.effects.tessellation.displacement_m()
+    }
+
+    /// Box of all surfaces without alpha blending, displaced ones where they may be, world space.
+    pub fn bounds_ws(&self) -> Aabb {
+        self.placed.bounds_ws(self.displacement_m())
+    }
 }
 
 /// Fills a buffer, as long as it was declared, for a view. What it leaves is undefined, and nobody may read it.
 type Fill = dyn Fn(&View<'_>, &mut [u8]) + Send + Sync;
 
-/// A buffer that is written for every view.
+/// What an input changes with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ChangesWith {
+    /// The camera, and where surfaces stand.
+    Camera,
+    /// Where surfaces stand, alone.
+    Pose,
+}
+
+/// A buffer or an image that is written for every view.
 pub struct ViewInput {
-    /// The buffer, in the device's memory.
-    pub buffer: gpu::Buffer,
+    /// Where it is written to, in the device's memory.
+    pub target: FrameInput,
+    /// What it changes with.
+    pub changes_with: ChangesWith,
     fill: Box<Fill>,
 }
 
@@ -93,15 +121,53 @@ impl ViewInputs {
         device: &gpu::Device,
         graph: &mut Graph,
         (name, role): (&str, BufferRole),
-        bytes: u64,
-        usage: vk::BufferUsageFlags,
+        (bytes, usage, changes_with): (u64, vk::BufferUsageFlags, ChangesWith),
         fill: impl Fn(&View<'_>, &mut [u8]) + Send + Sync + 'static,
     ) -> Result<BufferHandle, TechniqueError> {
         let memory = gpu::MemoryKind::DeviceLocal;
         let buffer = device.create_buffer(&gpu::BufferDesc { name, bytes, usage, memory })?;
         let handle = graph.import_buffer(name, role, &buffer);
-        self.inputs.borrow_mut().push(ViewInput { buffer, fill: Box::new(fill) });
+        let target = FrameInput::Buffer(buffer);
+        self.inputs.borrow_mut().push(ViewInput { target, changes_with, fill: Box::new(fill) });
         Ok(handle)
+    }
+
+    /// Where the draws of a scene stand, as the vertex stream of instances and as an image of records, for each pose.
+    ///
+    /// # Errors
+    /// The device.
+    pub fn declare_records(
+        &self,
+        device: &gpu::Device,
+        graph: &mut Graph,
+        scene: &SceneGpu,
+    ) -> Result<(BufferHandle, ImageHandle), TechniqueError> {
+        let usage = vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::VERTEX_BUFFER;
+        let how = (scene.draws.bytes(), usage, ChangesWith::Pose);
+        let named = ("scene draws", BufferRole::Scene);
+        let stream =
+            self.declare(device, graph, named, how, |view, bytes| put(bytes, 0, &view.placed.records))?;
+        // A record of four texels is as long as in the stream.
+        let name = "scene draw records";
+        let [width, height] = scene.draw_data.extent();
+        let image = device.create_image(&gpu::ImageDesc {
+            name,
+            format: scene.draw_data.format(),
+            width,
+            height,
+            layers: 1,
+            mips: 1,
+            samples: 1,
+            usage: vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST,
+        })?;
+        let layout = vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL;
+        let handle = graph.import_image(name, BufferRole::Scene, &image, layout);
+        self.inputs.borrow_mut().push(ViewInput {
+            target: FrameInput::Image(image),
+            changes_with: ChangesWith::Pose,
+            fill: Box::new(|view, bytes| put(bytes, 0, &view.placed.records)),
+        });
+        Ok((stream, handle))
     }
 
     /// Brings the commands of the draws that `of_view` chooses into the graph, named after `name`: a range a bucket, with room for all.
@@ -112,23 +178,33 @@ impl ViewInputs {
         &self,
         device: &gpu::Device,
         graph: &mut Graph,
-        name: &str,
+        (name, changes_with): (&str, ChangesWith),
         scene: &SceneGpu,
         of_view: impl for<'v> Fn(&'v View<'_>) -> Cow<'v, [Vec<u32>; BUCKETS]> + Clone + Send + Sync + 'static,
     ) -> Result<DrawCommands, TechniqueError> {
         let usage = vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::INDIRECT_BUFFER;
-        let bytes = COMMAND_BYTES * scene.draw_infos.len().max(1) as u64;
+        let bytes = COMMAND_BYTES * scene.draw_count().max(1) as u64;
         let names = [format!("{name} commands"), format!("{name} counts")];
         let counted = of_view.clone();
-        let commands =
-            self.declare(device, graph, (&names[0], BufferRole::Scene), bytes, usage, move |view, bytes| {
+        let commands = self.declare(
+            device,
+            graph,
+            (&names[0], BufferRole::Scene),
+            (bytes, usage, changes_with),
+            move |view, bytes| {
                 write_commands(view.scene, &of_view(view), bytes);
-            })?;
+            },
+        )?;
         let bytes = 4 * BUCKETS as u64;
-        let counts =
-            self.declare(device, graph, (&names[1], BufferRole::Scene), bytes, usage, move |view, bytes| {
+        let counts = self.declare(
+            device,
+            graph,
+            (&names[1], BufferRole::Scene),
+            (bytes, usage, changes_with),
+            move |view, bytes| {
                 write_counts(&counted(view), bytes);
-            })?;
+            },
+        )?;
         Ok(DrawCommands { commands, counts, first: scene.bucket_first })
     }
 }
@@ -146,7 +222,22 @@ impl Frame<'_> {
         usage: vk::BufferUsageFlags,
         fill: impl Fn(&View<'_>, &mut [u8]) + Send + Sync + 'static,
     ) -> Result<BufferHandle, TechniqueError> {
-        self.inputs.declare(self.device, graph, named, bytes, usage, fill)
+        self.inputs.declare(self.device, graph, named, (bytes, usage, ChangesWith::Camera), fill)
+    }
+
+    /// As [`Self::of_view`], of what does not change with the camera, but with where surfaces stand.
+    ///
+    /// # Errors
+    /// The device.
+    pub fn of_pose(
+        &self,
+        graph: &mut Graph,
+        named: (&str, BufferRole),
+        bytes: u64,
+        usage: vk::BufferUsageFlags,
+        fill: impl Fn(&View<'_>, &mut [u8]) + Send + Sync + 'static,
+    ) -> Result<BufferHandle, TechniqueError> {
+        self.inputs.declare(self.device, graph, named, (bytes, usage, ChangesWith::Pose), fill)
     }
 
     /// As [`Frame::table`], of words that the view decides: at most `most_words`, of which `words` gives the first.

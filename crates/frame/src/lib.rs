@@ -34,7 +34,7 @@ pub use effects::{
 };
 pub use error::TechniqueError;
 pub use frame::{DrawCommands, Frame, SceneBuffers};
-pub use inputs::{View, ViewInput, ViewInputs, ViewScript, put};
+pub use inputs::{ChangesWith, View, ViewInput, ViewInputs, ViewScript, put};
 pub use params::{ParamError, ParamInfo, ParamKind, ParamSet, Params};
 pub use scene::{
     SceneGpu,

@@ -702,6 +702,15 @@ impl Encoder {
         self.keep_image(to);
     }
 
+    /// Copies texels from a buffer to an image in `TRANSFER_DST_OPTIMAL`.
+    pub fn copy_buffer_to_image(&mut self, from: &Buffer, to: &Image, regions: &[vk::BufferImageCopy]) {
+        let dst = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
+        // SAFETY: as in `barriers`.
+        unsafe { self.raw().cmd_copy_buffer_to_image(self.commands, from.0.raw, to.0.raw, dst, regions) };
+        self.keep_buffer(from);
+        self.keep_image(to);
+    }
+
     /// Copies from an image in `TRANSFER_SRC_OPTIMAL` to a buffer.
     pub fn copy_image_to_buffer(&mut self, from: &Image, to: &Buffer, regions: &[vk::BufferImageCopy]) {
         let src = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;

@@ -42,7 +42,7 @@ pub use declare::{
     StencilFace, StencilTest, Step, Subresource, VertexAttribute, VertexLayout, VertexStream,
 };
 pub use error::GraphError;
-pub use execute::{Executor, FrameSlot, FrameTimes, ResourceKey};
+pub use execute::{Executor, FrameInput, FrameSlot, FrameTimes, ResourceKey};
 pub use plan::{
     Access, Barrier, MemoryNeed, Placement, Plan, PlannedHeap, PlannedPass, PlannedResource, Requirements,
     Traffic,

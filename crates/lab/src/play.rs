@@ -81,8 +81,12 @@ pub fn play(
     listener: &dyn Listener,
 ) -> Result<Play, LabError> {
     how.check()?;
-    let options =
-        FlightOptions { in_flight: how.in_flight, shortfall: Shortfall::DrawAgain, pictures: sees.is_some() };
+    let options = FlightOptions {
+        in_flight: how.in_flight,
+        shortfall: Shortfall::DrawAgain,
+        pictures: sees.is_some(),
+        nodes_move: false,
+    };
     let first = path.at(how.place(0));
     let task = listener.task("preparing", chosen.len() as u64);
     let mut flights = Vec::with_capacity(chosen.len());
@@ -115,7 +119,12 @@ pub fn play(
                 (false, true) => {
                     let camera = path.at(how.place(frame));
                     flight.frame(
-                        FrameContext { index: frame, time_s: frame as f64 / how.fps, camera },
+                        FrameContext {
+                            index: frame,
+                            time_s: frame as f64 / how.fps,
+                            camera,
+                            world_from_objects: None,
+                        },
                         &mut done,
                     )?;
                 }

@@ -11,10 +11,11 @@ use std::{
 
 use afterlight_graph::{FrameSlot, FrameTimes, ResourceId};
 use afterlight_scene::Camera;
+use glam::Affine3A;
 
 use crate::{Prepared, Renderer, renderer::Recipe};
 use afterlight_frame::{
-    Params, Settings, Technique, TechniqueError,
+    ChangesWith, Params, Settings, Technique, TechniqueError,
     capacity::{Capacities, Demand, Shortage},
     completed,
 };
@@ -40,11 +41,13 @@ pub struct FlightOptions {
     pub shortfall: Shortfall,
     /// Whether pictures are copied to where the host can read them.
     pub pictures: bool,
+    /// Whether instances may move ([`FrameContext::world_from_objects`]): the records of draws are then inputs of each frame.
+    pub nodes_move: bool,
 }
 
 impl Default for FlightOptions {
     fn default() -> Self {
-        Self { in_flight: 3, shortfall: Shortfall::DrawAgain, pictures: false }
+        Self { in_flight: 3, shortfall: Shortfall::DrawAgain, pictures: false, nodes_move: false }
     }
 }
 
@@ -57,6 +60,8 @@ pub struct FrameContext {
     pub time_s: f64,
     /// The camera.
     pub camera: Camera,
+    /// World from object of each instance of the scene; `None` is where they were uploaded.
+    pub world_from_objects: Option<Arc<[Affine3A]>>,
 }
 
 /// Something that costs a frame more than its neighbours.
@@ -93,6 +98,8 @@ struct Place {
     plan: u64,
     /// Lists that can overflow, each an output of the slot.
     demands: Arc<[Demand]>,
+    /// The pose that it has the inputs of.
+    pose: Option<u64>,
     flying: Option<Flying>,
 }
 
@@ -112,6 +119,8 @@ pub struct Flight<'r> {
     /// Counts the plans so far.
     plan: u64,
     demands: Arc<[Demand]>,
+    /// What the last frame that was sent on its way shows.
+    shown: Option<FrameContext>,
     /// In the order of their frames, the oldest first.
     places: VecDeque<Place>,
 }
@@ -128,15 +137,18 @@ impl Renderer {
         camera: &Camera,
         options: FlightOptions,
     ) -> Result<Flight<'r>, TechniqueError> {
-        let prepared = self.prepare_moving(technique, params, camera)?;
+        let params = completed(technique, params);
+        let recipe = Recipe { technique, params: &params, moves: true, nodes_move: options.nodes_move };
+        let prepared = self.prepare_to_move(&recipe, camera)?;
         let mut flight = Flight {
             renderer: self,
             technique,
-            params: completed(technique, params),
+            params,
             options,
             plan: 0,
             demands: prepared.demands.clone().into(),
             prepared,
+            shown: None,
             places: VecDeque::new(),
         };
         // Ahead of the frames that need them.
@@ -162,13 +174,13 @@ impl Flight<'_> {
         self.hand_on(self.options.in_flight.max(1) as usize - 1, done)?;
         let start = Instant::now();
         let mut events = Vec::new();
-        if self.prepared.shows_all_views {
-            self.prepared.viewed.look_through(&context.camera);
-        } else {
+        self.show(&context)?;
+        if !self.prepared.shows_all_views {
             self.plan_anew(&context.camera, self.prepared.capacities.again())?;
             events.push(Event::Planned);
         }
         let place = self.launch()?;
+        self.shown = Some(context.clone());
         let flying = Flying { context, cpu: start.elapsed(), events };
         self.places.push_back(Place { flying: Some(flying), ..place });
         Ok(())
@@ -211,6 +223,17 @@ impl Flight<'_> {
         self.prepared.executor.plan().passes.iter().map(|pass| pass.name.clone()).collect()
     }
 
+    /// Looks at what a frame shows.
+    fn show(&mut self, context: &FrameContext) -> Result<(), TechniqueError> {
+        match &context.world_from_objects {
+            Some(_) if !self.options.nodes_move => return Err(TechniqueError::NodesStandStill),
+            Some(world_from_objects) => self.prepared.viewed.place(world_from_objects)?,
+            None => self.prepared.viewed.rest(),
+        }
+        self.prepared.viewed.look_through(&context.camera);
+        Ok(())
+    }
+
     /// Submits a frame of the current view.
     fn launch(&mut self) -> Result<Place, TechniqueError> {
         // A place whose frame was handed on stands at the front.
@@ -228,18 +251,22 @@ impl Flight<'_> {
             self.prepared.executor.record_again(&mut place.slot)?;
         }
         let view = self.prepared.viewed.view();
+        let stands_still = place.pose == Some(self.prepared.viewed.pose);
         for (i, input) in self.prepared.inputs.iter().enumerate() {
-            place.slot.write(i, |bytes| input.fill(&view, bytes))?;
+            if input.changes_with == ChangesWith::Camera || !stands_still {
+                place.slot.write(i, |bytes| input.fill(&view, bytes))?;
+            }
         }
+        place.pose = Some(self.prepared.viewed.pose);
         place.slot.submit()?;
         Ok(place)
     }
 
     /// A place of the current plan.
     fn new_place(&self) -> Result<Place, TechniqueError> {
-        let inputs: Vec<_> = self.prepared.inputs.iter().map(|input| input.buffer.clone()).collect();
+        let inputs: Vec<_> = self.prepared.inputs.iter().map(|input| input.target.clone()).collect();
         let slot = self.prepared.executor.slot(&inputs, &self.outputs())?;
-        Ok(Place { slot, plan: self.plan, demands: self.demands.clone(), flying: None })
+        Ok(Place { slot, plan: self.plan, demands: self.demands.clone(), pose: None, flying: None })
     }
 
     /// What is read after each frame: a counter a list, then the picture.
@@ -250,8 +277,14 @@ impl Flight<'_> {
 
     fn plan_anew(&mut self, camera: &Camera, capacities: Capacities) -> Result<(), TechniqueError> {
         let settings = Settings { camera: camera.clone(), ..self.renderer.settings().clone() };
-        let recipe = Recipe { technique: self.technique, params: &self.params, moves: true };
-        self.prepared = self.renderer.record(&recipe, &settings, capacities, &|_, _| {})?;
+        let moved = self.prepared.viewed.moved.take();
+        let recipe = Recipe {
+            technique: self.technique,
+            params: &self.params,
+            moves: true,
+            nodes_move: self.options.nodes_move,
+        };
+        self.prepared = self.renderer.record(&recipe, &settings, moved, capacities, &|_, _| {})?;
         self.demands = self.prepared.demands.clone().into();
         self.plan += 1;
         Ok(())
@@ -310,23 +343,27 @@ impl Flight<'_> {
                 return Ok(fell_short);
             }
             flying.events.extend(growing.map(|shortage| Event::Grown(shortage.clone())));
-            let now = self.prepared.viewed.settings.camera.clone();
+            let now = self.shown.clone();
             let is_drawn_again = fell_short && self.options.shortfall == Shortfall::DrawAgain;
-            let camera = if is_drawn_again { &flying.context.camera } else { &now };
+            if is_drawn_again {
+                self.show(&flying.context)?;
+            }
+            let camera = self.prepared.viewed.settings.camera.clone();
             // A frame before this one may have made room already.
             if self.prepared.capacities.lack(&shortages) {
-                self.plan_anew(camera, self.prepared.capacities.grown(&shortages))?;
+                self.plan_anew(&camera, self.prepared.capacities.grown(&shortages))?;
             } else if is_drawn_again && !self.prepared.shows_all_views {
-                self.plan_anew(camera, self.prepared.capacities.again())?;
+                self.plan_anew(&camera, self.prepared.capacities.again())?;
             }
             if !is_drawn_again {
                 return Ok(fell_short);
             }
             flying.events.push(Event::DrawnAgain);
-            self.prepared.viewed.look_through(camera);
             *place = self.launch()?;
             place.slot.finish()?;
-            self.prepared.viewed.look_through(&now);
+            if let Some(now) = &now {
+                self.show(now)?;
+            }
         }
         Ok(false)
     }

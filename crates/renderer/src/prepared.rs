@@ -2,13 +2,19 @@
 
 use std::sync::Arc;
 
-use afterlight_graph::{Executor, FrameReport, ResourceId, gpu};
+use afterlight_graph::{Executor, FrameInput, FrameReport, ResourceId, gpu};
 use afterlight_scene::Camera;
+use glam::Affine3A;
 
 use afterlight_frame::{
-    CameraView, LightPairs, SceneLights, Settings, TechniqueError, View, ViewInput, ViewInputs, ViewScript,
+    CameraView, DrawParams, LightPairs, SceneLights, Settings, TechniqueError, View, ViewInput, ViewInputs,
+    ViewScript,
     capacity::{Capacities, Counter, Demand},
-    scene::{SceneGpu, draw_list::DrawChoice},
+    scene::{
+        SceneGpu,
+        draw_list::DrawChoice,
+        placed::{Placed, TurnedOver},
+    },
     views,
 };
 
@@ -39,14 +45,56 @@ pub(crate) struct Viewed {
     pub lights: Arc<SceneLights>,
     pub camera: CameraView,
     pub draws: DrawChoice,
+    /// Where surfaces stand, where that is not as in the scene.
+    pub moved: Option<Box<Placed>>,
+    /// Counts the poses so far.
+    pub pose: u64,
 }
 
 impl Viewed {
+    /// A view of a scene; surfaces stand where `moved` says, or as they were uploaded.
+    pub fn new(
+        settings: &Settings,
+        scene: Arc<SceneGpu>,
+        lights: Arc<SceneLights>,
+        moved: Option<Box<Placed>>,
+        options: DrawParams,
+    ) -> Self {
+        let placed = moved.as_deref().unwrap_or(&scene.rest);
+        let camera = CameraView::fitted(settings, placed);
+        let draws = DrawChoice::new(options);
+        let mut viewed = Self { settings: settings.clone(), camera, draws, moved, pose: 0, scene, lights };
+        viewed.choose_draws();
+        viewed
+    }
+
     /// Looks through another camera.
     pub fn look_through(&mut self, camera: &Camera) {
         self.settings.camera.clone_from(camera);
-        self.camera = CameraView::fitted(&self.settings, &self.scene);
-        self.draws.update(&self.scene, &self.camera, self.settings.effects.tessellation.displacement_m());
+        self.camera = CameraView::fitted(&self.settings, self.moved.as_deref().unwrap_or(&self.scene.rest));
+        self.choose_draws();
+    }
+
+    /// Moves surfaces to where their instances are, one matrix each. The camera must be looked through again.
+    pub fn place(&mut self, world_from_objects: &[Affine3A]) -> Result<(), TechniqueError> {
+        let placed = self.moved.get_or_insert_with(|| Box::new(self.scene.rest.clone()));
+        self.pose += 1;
+        placed
+            .place(&self.scene.draw_sources, world_from_objects)
+            .map_err(|over: TurnedOver| TechniqueError::TurnedOver { instance: over.instance })
+    }
+
+    /// Moves surfaces to where they were uploaded.
+    pub fn rest(&mut self) {
+        if self.moved.take().is_some() {
+            self.pose += 1;
+        }
+    }
+
+    fn choose_draws(&mut self) {
+        let placed = self.moved.as_deref().unwrap_or(&self.scene.rest);
+        let displacement_m = self.settings.effects.tessellation.displacement_m();
+        self.draws.update(&self.scene, &placed.infos, &self.camera, displacement_m);
     }
 
     pub fn view(&self) -> View<'_> {
@@ -56,6 +104,7 @@ impl Viewed {
             scene: &self.scene,
             lights: &self.lights,
             visible: &self.draws.visible,
+            placed: self.moved.as_deref().unwrap_or(&self.scene.rest),
         }
     }
 }
@@ -120,9 +169,12 @@ impl Prepared {
         let mut bytes = Vec::new();
         for input in &self.inputs {
             bytes.clear();
-            bytes.resize(input.buffer.bytes() as usize, 0);
+            bytes.resize(input.target.bytes() as usize, 0);
             input.fill(&self.viewed.view(), &mut bytes);
-            uploader.buffer(&input.buffer, 0, &bytes)?;
+            match &input.target {
+                FrameInput::Buffer(buffer) => uploader.buffer(buffer, 0, &bytes)?,
+                FrameInput::Image(image) => uploader.image(image, 0, 0, &bytes)?,
+            }
         }
         Ok(uploader.finish()?)
     }
@@ -199,8 +251,9 @@ impl Prepared {
             bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
         let Settings { width_px, height_px, .. } = self.viewed.settings;
         let pixels = width_px as usize * height_px as usize;
-        let Viewed { settings, scene, lights, camera, .. } = &self.viewed;
-        let to_distance = camera.constants(settings, lights, scene).depth_to_distance;
+        let view = self.viewed.view();
+        let to_distance =
+            view.camera.constants(view.settings, view.lights, &view.bounds_ws()).depth_to_distance;
         Ok((bytes.len() == 4 * pixels).then_some(StoredDepth { values, to_distance }))
     }
 

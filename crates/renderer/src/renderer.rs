@@ -11,12 +11,13 @@ use afterlight_shader::{Shader, structs::FrameConstants};
 
 use crate::prepared::{Kept, Prepared, Viewed};
 use afterlight_frame::{
-    Board, CameraView, Cull, DrawParams, Frame, MAX_DISPLACEMENT_MM, MIN_TESSELLATE_PX, OpaqueDepth, Params,
-    SceneBuffers, SceneLights, Settings, Technique, TechniqueError, TessellationEffect, View, ViewInputs,
+    Board, CameraView, ChangesWith, Cull, DrawParams, Frame, MAX_DISPLACEMENT_MM, MIN_TESSELLATE_PX,
+    OpaqueDepth, Params, SceneBuffers, SceneLights, Settings, Technique, TechniqueError, TessellationEffect,
+    ViewInputs,
     camera_view::{background_radiance, coarse_depth_warning},
     capacity::{self, Capacities},
     completed, put,
-    scene::{SceneGpu, draw_list::DrawChoice},
+    scene::{SceneGpu, placed::Placed},
     upload::upload_slice,
     views,
 };
@@ -44,6 +45,8 @@ pub(crate) struct Recipe<'a> {
     pub params: &'a Params,
     /// Whether the frame is to be run from other views too.
     pub moves: bool,
+    /// Whether surfaces may stand elsewhere then.
+    pub nodes_move: bool,
 }
 
 /// A scene on a device with a view of it: prepares techniques to run.
@@ -121,11 +124,12 @@ impl Renderer {
     /// Nearest and farthest view distance, m, that a surface of the scene can have in this view: what clusters lie between. From the
     /// eye as the frame has it, see [`CameraView::eye_moved_m`].
     pub fn distance_range_m(&self) -> [f32; 2] {
-        self.view().constants(&self.settings, &self.lights, &self.scene).distance_range_m
+        let bounds_ws = self.scene.rest.bounds_ws(self.settings.effects.tessellation.displacement_m());
+        self.view().constants(&self.settings, &self.lights, &bounds_ws).distance_range_m
     }
 
     fn view(&self) -> CameraView {
-        CameraView::fitted(&self.settings, &self.scene)
+        CameraView::fitted(&self.settings, &self.scene.rest)
     }
 
     /// What of the settings this scene or this device cannot give, a line each.
@@ -162,7 +166,8 @@ impl Renderer {
     ) -> Result<Prepared, TechniqueError> {
         self.check(technique)?;
         self.check_tessellation(technique)?;
-        let recipe = Recipe { technique, params: &completed(technique, params), moves: false };
+        let recipe =
+            Recipe { technique, params: &completed(technique, params), moves: false, nodes_move: false };
         self.prepare_recipe(&recipe, &self.settings, also)
     }
 
@@ -177,11 +182,19 @@ impl Renderer {
         params: &Params,
         camera: &Camera,
     ) -> Result<Prepared, TechniqueError> {
-        self.check(technique)?;
-        self.check_tessellation(technique)?;
-        let recipe = Recipe { technique, params: &completed(technique, params), moves: true };
+        let params = &completed(technique, params);
+        self.prepare_to_move(&Recipe { technique, params, moves: true, nodes_move: false }, camera)
+    }
+
+    pub(crate) fn prepare_to_move(
+        &self,
+        recipe: &Recipe<'_>,
+        camera: &Camera,
+    ) -> Result<Prepared, TechniqueError> {
+        self.check(recipe.technique)?;
+        self.check_tessellation(recipe.technique)?;
         let settings = Settings { camera: camera.clone(), ..self.settings.clone() };
-        self.prepare_recipe(&recipe, &settings, |_, _| {})
+        self.prepare_recipe(recipe, &settings, |_, _| {})
     }
 
     fn prepare_recipe(
@@ -192,7 +205,7 @@ impl Renderer {
     ) -> Result<Prepared, TechniqueError> {
         let mut capacities = Capacities::default();
         for _ in 1..RECORDINGS_MAX {
-            let mut prepared = self.record(recipe, settings, capacities, &also)?;
+            let mut prepared = self.record(recipe, settings, None, capacities, &also)?;
             if !prepared.capacities.is_watched() {
                 return Ok(prepared);
             }
@@ -208,7 +221,7 @@ impl Renderer {
             }
         }
         // What it needs still grows: its counters tell what it drops.
-        self.record(recipe, settings, capacities, &also)
+        self.record(recipe, settings, None, capacities, &also)
     }
 
     fn check(&self, technique: &dyn Technique) -> Result<(), TechniqueError> {
@@ -278,21 +291,14 @@ impl Renderer {
         &self,
         recipe: &Recipe<'_>,
         settings: &Settings,
+        moved: Option<Box<Placed>>,
         capacities: Capacities,
         also: &impl Fn(&mut Graph, &ImageHandle),
     ) -> Result<Prepared, TechniqueError> {
-        let Recipe { technique, params, moves } = *recipe;
-        let camera = CameraView::fitted(settings, &self.scene);
+        let Recipe { technique, params, moves, nodes_move } = *recipe;
         let options = *params.typed::<DrawParams>();
-        let mut draws = DrawChoice::new(options);
-        draws.update(&self.scene, &camera, settings.effects.tessellation.displacement_m());
-        let view = View {
-            camera: &camera,
-            settings,
-            scene: &self.scene,
-            lights: &self.lights,
-            visible: &draws.visible,
-        };
+        let viewed = Viewed::new(settings, self.scene.clone(), self.lights.clone(), moved, options);
+        let view = viewed.view();
         let blended = BlendedList::of_view(&view, options.cull == Cull::Frustum, moves);
 
         let inputs = ViewInputs::default();
@@ -304,17 +310,17 @@ impl Renderer {
             params,
             scene: &self.scene,
             lights: &self.lights,
-            clip_from_world: camera.clip_from_world,
-            eye_moved_m: camera.eye_moved_m,
+            clip_from_world: view.camera.clip_from_world,
+            eye_moved_m: view.camera.eye_moved_m,
             background_radiance: background_radiance(settings).into(),
             view: &settings.view,
             tessellate_px: settings.effects.tessellation.edge_px,
             displacement_m: settings.effects.tessellation.displacement_m(),
-            buffers: self.import(&mut graph, &inputs)?,
+            buffers: self.import(&mut graph, &inputs, nodes_move)?,
             shaders: &[&self.extra_shaders, technique.shaders(), &afterlight_stages::SHADERS],
             device: &self.device,
             capacities: &capacities,
-            visible: &draws.visible,
+            visible: view.visible,
             inputs: &inputs,
             moves,
             board: Board::default(),
@@ -345,33 +351,42 @@ impl Renderer {
             light_pairs: hdr_id.filter(|_| counts_pairs),
             final_color,
         };
-        let draw_calls = draws.count() + blended.as_ref().map_or(0, |list| list.draw_count);
-        let viewed = Viewed {
-            settings: settings.clone(),
-            scene: self.scene.clone(),
-            lights: self.lights.clone(),
-            camera,
-            draws,
-        };
+        let draw_calls = viewed.draws.count() + blended.as_ref().map_or(0, |list| list.draw_count);
         Prepared::new(&self.device, executor, viewed, inputs, capacities, kept, draw_calls)
     }
 
-    fn import(&self, graph: &mut Graph, inputs: &ViewInputs) -> Result<SceneBuffers, TechniqueError> {
+    /// Brings the scene into a graph; where it is `alive`, the records of its draws are inputs.
+    fn import(
+        &self,
+        graph: &mut Graph,
+        inputs: &ViewInputs,
+        alive: bool,
+    ) -> Result<SceneBuffers, TechniqueError> {
         let s = &self.scene;
         let constants = inputs.declare(
             &self.device,
             graph,
             ("frame constants", BufferRole::Constants),
-            size_of::<FrameConstants>() as u64,
-            vk::BufferUsageFlags::UNIFORM_BUFFER,
-            |view, bytes| put(bytes, 0, &[view.camera.constants(view.settings, view.lights, view.scene)]),
+            (size_of::<FrameConstants>() as u64, vk::BufferUsageFlags::UNIFORM_BUFFER, ChangesWith::Camera),
+            |view, bytes| {
+                let bounds_ws = view.bounds_ws();
+                put(bytes, 0, &[view.camera.constants(view.settings, view.lights, &bounds_ws)]);
+            },
         )?;
-        let draws =
-            inputs.declare_draws(&self.device, graph, "draw", s, |view| Cow::Borrowed(view.visible))?;
+        let draws = inputs.declare_draws(&self.device, graph, ("draw", ChangesWith::Camera), s, |view| {
+            Cow::Borrowed(view.visible)
+        })?;
+        let (stream, records) = match alive {
+            true => inputs.declare_records(&self.device, graph, s)?,
+            false => (
+                graph.import_buffer("scene draws", BufferRole::Scene, &s.draws),
+                graph.import_image("scene draw records", BufferRole::Scene, &s.draw_data, UPLOADED),
+            ),
+        };
         Ok(SceneBuffers {
             frame: constants,
-            draws: graph.import_buffer("scene draws", BufferRole::Scene, &s.draws),
-            draw_data: graph.import_image("scene draw records", BufferRole::Scene, &s.draw_data, UPLOADED),
+            draws: stream,
+            draw_data: records,
             materials: graph.import_image("scene materials", BufferRole::Scene, &s.materials, UPLOADED),
             uv_transforms: graph.import_buffer(
                 "scene texture transforms",

@@ -48,7 +48,7 @@ fn flown(flight: &mut Flight<'_>, cameras: &[Camera]) -> (Vec<Rgba8Image>, Vec<V
         Ok(())
     };
     for (index, camera) in (0..).zip(cameras) {
-        let context = FrameContext { index, time_s: 0.0, camera: camera.clone() };
+        let context = FrameContext { index, time_s: 0.0, camera: camera.clone(), world_from_objects: None };
         flight.frame(context, &mut done).unwrap_or_else(|e| panic!("{e}"));
     }
     flight.land(&mut done).unwrap_or_else(|e| panic!("{e}"));
@@ -160,7 +160,8 @@ fn a_view_that_needs_far_more_than_the_last_is_drawn_again_or_told() {
             Ok(())
         };
         for (index, camera) in (0..).zip(&cameras) {
-            let context = FrameContext { index, time_s: 0.0, camera: camera.clone() };
+            let context =
+                FrameContext { index, time_s: 0.0, camera: camera.clone(), world_from_objects: None };
             flight.frame(context, &mut done).unwrap_or_else(|e| panic!("{id}: {e}"));
         }
         flight.land(&mut done).unwrap_or_else(|e| panic!("{id}: {e}"));

@@ -1,6 +1,6 @@
 //! The order in which triangles with alpha blending are drawn: back to front, found on the CPU.
 
-use std::ops::Range;
+use std::{ops::Range, sync::Arc};
 
 use afterlight_scene::{Aabb, Scene};
 use afterlight_shader::structs::DrawData;
@@ -12,14 +12,18 @@ use crate::scene::{
 };
 
 /// What the CPU keeps of a scene's draws with alpha blending.
+#[derive(Clone)]
 pub struct Blended {
     draws: Vec<BlendedDraw>,
-    /// Centroids of all triangles, draw by draw, m.
+    /// Centroids of all triangles, draw by draw, object space, m.
+    centroids_os: Arc<[Vec3]>,
+    /// The same in world space.
     centroids_ws: Vec<Vec3>,
     /// Their corners, counted from the first vertex of their draw.
-    corners: Vec<[u32; 3]>,
+    corners: Arc<[[u32; 3]]>,
 }
 
+#[derive(Clone)]
 struct BlendedDraw {
     /// Its number among all draws of the scene.
     number: u32,
@@ -67,23 +71,34 @@ impl Blended {
         infos: Vec<DrawInfo>,
         first_number: usize,
     ) -> Self {
-        let mut blended = Self { draws: Vec::new(), centroids_ws: Vec::new(), corners: Vec::new() };
+        let (mut draws, mut all_corners) = (Vec::new(), Vec::new());
+        let (mut centroids_os, mut centroids_ws) = (Vec::new(), Vec::new());
         for (k, (record, info)) in records.iter().zip(&infos).enumerate() {
-            let first = blended.corners.len();
+            let first = all_corners.len();
             let positions_os = &scene.positions_os[info.first_vertex as usize..];
             for corners in indices[info.first_index as usize..][..info.index_count as usize].chunks_exact(3) {
                 let sum_os: Vec3 = corners.iter().map(|&i| Vec3::from(positions_os[i as usize])).sum();
-                blended.centroids_ws.push(to_world(record, sum_os / 3.0));
-                blended.corners.push([corners[0], corners[1], corners[2]]);
+                centroids_os.push(sum_os / 3.0);
+                centroids_ws.push(to_world(record, sum_os / 3.0));
+                all_corners.push([corners[0], corners[1], corners[2]]);
             }
-            blended.draws.push(BlendedDraw {
+            draws.push(BlendedDraw {
                 number: (first_number + k) as u32,
                 bounds_ws: info.bounds_ws,
                 first_vertex: info.first_vertex,
-                triangles: first..blended.corners.len(),
+                triangles: first..all_corners.len(),
             });
         }
-        blended
+        Self { draws, centroids_os: centroids_os.into(), centroids_ws, corners: all_corners.into() }
+    }
+
+    /// Moves a draw, by its place among those with alpha blending, to where its record says, within these bounds.
+    pub fn place(&mut self, place: usize, record: &DrawData, bounds_ws: Aabb) {
+        let Some(draw) = self.draws.get_mut(place) else { return };
+        draw.bounds_ws = bounds_ws;
+        for triangle in draw.triangles.clone() {
+            self.centroids_ws[triangle] = to_world(record, self.centroids_os[triangle]);
+        }
     }
 
     /// Number of triangles.
@@ -161,20 +176,22 @@ mod tests {
 
     /// Draws whose triangles have their centroids at those distances, m; corners are numbered through a draw.
     fn blended(draws: &[&[f32]]) -> Blended {
-        let mut blended = Blended { draws: Vec::new(), centroids_ws: Vec::new(), corners: Vec::new() };
+        let (mut blended, mut corners) = (Vec::new(), Vec::new());
+        let mut centroids_ws = Vec::new();
         for (number, distances_m) in (10..).zip(draws) {
-            let first = blended.corners.len();
+            let first = corners.len();
             let mut bounds_ws = Aabb::EMPTY;
             for (t, distance_m) in (0..).zip(*distances_m) {
                 let centroid = Vec3::new(0.0, 0.0, -distance_m);
                 bounds_ws.extend(centroid);
-                blended.centroids_ws.push(centroid);
-                blended.corners.push([3 * t, 3 * t + 1, 3 * t + 2]);
+                centroids_ws.push(centroid);
+                corners.push([3 * t, 3 * t + 1, 3 * t + 2]);
             }
-            let triangles = first..blended.corners.len();
-            blended.draws.push(BlendedDraw { number, bounds_ws, first_vertex: 100 * number, triangles });
+            let triangles = first..corners.len();
+            blended.push(BlendedDraw { number, bounds_ws, first_vertex: 100 * number, triangles });
         }
-        blended
+        let centroids_os = centroids_ws.clone().into();
+        Blended { draws: blended, centroids_os, centroids_ws, corners: corners.into() }
     }
 
     fn view(triangles_max: usize) -> ViewOrder {

@@ -2,7 +2,6 @@
 
 use std::ops::Range;
 
-use afterlight_graph::gpu::{self, vk};
 use afterlight_scene::Aabb;
 use glam::{Mat4, Vec3, Vec4};
 
@@ -47,20 +46,22 @@ impl DrawChoice {
         Self { options, ..Self::default() }
     }
 
-    /// Chooses and orders the draws for a view; surfaces may be displaced by `displacement_m` along each axis.
-    pub fn update(&mut self, scene: &SceneGpu, view: &CameraView, displacement_m: f32) {
+    /// Chooses and orders the draws for a view, which stand where `infos` says; surfaces may be displaced by `displacement_m` along each axis.
+    pub fn update(&mut self, scene: &SceneGpu, infos: &[DrawInfo], view: &CameraView, displacement_m: f32) {
         let frustum = Frustum::new(view.clip_from_world);
         let Self { options, visible, keyed } = self;
         for (bucket, visible) in visible.iter_mut().enumerate() {
             let (first, end) = (scene.bucket_first[bucket], scene.bucket_first[bucket + 1]);
             let in_view = |draw: &u32| {
-                let bounds = &scene.draw_infos[*draw as usize].bounds_ws;
+                let bounds = &infos[*draw as usize].bounds_ws;
                 options.cull == Cull::None || frustum.touches(&displaced(bounds, displacement_m))
             };
             keyed.clear();
-            keyed.extend((first..end).filter(in_view).map(|draw| {
-                (options.order.key(&scene.draw_infos[draw as usize].bounds_ws, view.eye_ws), draw)
-            }));
+            keyed.extend(
+                (first..end)
+                    .filter(in_view)
+                    .map(|draw| (options.order.key(&infos[draw as usize].bounds_ws, view.eye_ws), draw)),
+            );
             if options.order != DrawOrder::Scene {
                 // Draws of one distance keep the scene's order, so that equal depths resolve alike in every technique.
                 keyed.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
@@ -81,7 +82,7 @@ pub fn write_commands(scene: &SceneGpu, visible: &[Vec<u32>; BUCKETS], bytes: &m
     for (bucket, visible) in visible.iter().enumerate() {
         let first = scene.bucket_first[bucket] as usize;
         for (place, draw) in (first..).zip(visible) {
-            let one = command(&scene.draw_infos[*draw as usize], *draw);
+            let one = command(&scene.rest.infos[*draw as usize], *draw);
             put(bytes, place * COMMAND_BYTES as usize, &[one]);
         }
     }
@@ -90,38 +91,6 @@ pub fn write_commands(scene: &SceneGpu, visible: &[Vec<u32>; BUCKETS], bytes: &m
 /// Writes the number of commands of each bucket, 32 bits each.
 pub fn write_counts(visible: &[Vec<u32>; BUCKETS], bytes: &mut [u8]) {
     put(bytes, 0, &visible.each_ref().map(|bucket| bucket.len() as u32));
-}
-
-/// Indirect commands of a view, one range of the buffer a bucket, and their counts.
-pub struct DrawList {
-    /// A [`DrawCommand`] a draw in view.
-    pub commands: gpu::Buffer,
-    /// Number of commands of each bucket, 32 bits each.
-    pub counts: gpu::Buffer,
-}
-
-impl DrawList {
-    /// The draws of a choice.
-    ///
-    /// # Errors
-    /// The device.
-    pub fn new(device: &gpu::Device, scene: &SceneGpu, choice: &DrawChoice) -> Result<Self, gpu::GpuError> {
-        let buffer = |name, bytes| {
-            device.create_buffer(&gpu::BufferDesc {
-                name,
-                bytes,
-                usage: vk::BufferUsageFlags::INDIRECT_BUFFER | vk::BufferUsageFlags::STORAGE_BUFFER,
-                memory: gpu::MemoryKind::Upload,
-            })
-        };
-        let list = Self {
-            commands: buffer("draw commands", COMMAND_BYTES * scene.draw_infos.len().max(1) as u64)?,
-            counts: buffer("draw counts", 4 * BUCKETS as u64)?,
-        };
-        list.commands.with_mapped_mut(|bytes| write_commands(scene, &choice.visible, bytes))?;
-        list.counts.with_mapped_mut(|bytes| write_counts(&choice.visible, bytes))?;
-        Ok(list)
-    }
 }
 
 /// The indirect command of a draw; instances are draws.

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use afterlight_scene::{Aabb, AlphaMode, Material, Scene, TextureRef};
 use afterlight_shader::structs::{DRAW_MIRRORED, DrawData, TRIANGLE_BITS};
 
+use super::placed::{DrawSource, object_rows};
 use crate::TechniqueError;
 
 /// Most triangles of one draw. A triangle ID keeps the triangle's number within its draw in `TRIANGLE_BITS` bits, and
@@ -75,8 +76,8 @@ impl Bucket {
     }
 }
 
-/// A draw: its record, what the CPU needs of it, the names of its node and its material.
-type Draw = (DrawData, DrawInfo, [Arc<str>; 2]);
+/// A draw: its record, what the CPU needs of it, the names of its node and its material, what it is a piece of.
+type Draw = (DrawData, DrawInfo, [Arc<str>; 2], DrawSource);
 
 /// All draws of a scene by bucket, then those with alpha blending.
 pub(super) struct DrawTable {
@@ -85,6 +86,8 @@ pub(super) struct DrawTable {
     /// Of those in buckets.
     pub(super) infos: Vec<DrawInfo>,
     pub(super) names: Vec<[Arc<str>; 2]>,
+    /// Of all draws.
+    pub(super) sources: Vec<DrawSource>,
     pub(super) bucket_first: [u32; BUCKETS + 1],
     /// Of those with alpha blending.
     pub(super) blended: Vec<DrawInfo>,
@@ -94,7 +97,7 @@ impl DrawTable {
     pub(super) fn new(scene: &Scene, pieces: &[Vec<Aabb>]) -> Result<Self, TechniqueError> {
         let mut by_bucket: [Vec<Draw>; BUCKETS] = Default::default();
         let mut blended: Vec<Draw> = Vec::new();
-        for instance in &scene.instances {
+        for (number, instance) in (0..).zip(&scene.instances) {
             let mesh = &scene.meshes[instance.mesh as usize];
             let material = &scene.materials[mesh.material as usize];
             let m = &instance.world_from_object;
@@ -104,10 +107,7 @@ impl DrawTable {
                 4 * usize::from(masked) + 2 * usize::from(material.double_sided) + usize::from(mirrored);
             let node = scene.nodes.get(instance.node as usize).map_or("", |node| node.name.as_str());
             let names: [Arc<str>; 2] = [node.into(), material.name.as_str().into()];
-            let rows = [0, 1, 2].map(|i| {
-                let row = m.matrix3.row(i);
-                [row.x, row.y, row.z, m.translation[i]]
-            });
+            let rows = object_rows(m);
             let draws = match material.alpha_mode {
                 AlphaMode::Blend => &mut blended,
                 _ => &mut by_bucket[bucket],
@@ -133,6 +133,7 @@ impl DrawTable {
                         fetches: TextureFetches::new(material),
                     },
                     names.clone(),
+                    DrawSource { instance: number, bounds_os: *bounds_os },
                 ));
             }
         }
@@ -140,18 +141,21 @@ impl DrawTable {
             data: Vec::new(),
             infos: Vec::new(),
             names: Vec::new(),
+            sources: Vec::new(),
             bucket_first: [0; BUCKETS + 1],
             blended: Vec::new(),
         };
         for (bucket, draws) in by_bucket.into_iter().enumerate() {
-            for (data, info, names) in draws {
+            for (data, info, names, source) in draws {
+                table.sources.push(source);
                 table.data.push(data);
                 table.infos.push(info);
                 table.names.push(names);
             }
             table.bucket_first[bucket + 1] = table.data.len() as u32;
         }
-        for (data, info, _) in blended {
+        for (data, info, _, source) in blended {
+            table.sources.push(source);
             table.data.push(data);
             table.blended.push(info);
         }

@@ -8,20 +8,21 @@ pub mod lights;
 mod limit_tests;
 mod materials;
 mod pieces;
+pub mod placed;
 mod textures;
 
 use std::sync::Arc;
 
 use afterlight_graph::gpu::{self, vk};
-use afterlight_scene::{Aabb, Scene};
+use afterlight_scene::Scene;
 
 pub use self::draws::{BUCKETS, Bucket, DRAW_TRIANGLES, DrawInfo, TextureFetches};
 use self::{
     blended::Blended,
-    draw_list::displaced,
     draws::DrawTable,
     materials::{material_records, uses_uv1},
     pieces::compact_pieces,
+    placed::{DrawSource, Placed},
     textures::TextureTable,
 };
 use crate::{
@@ -56,12 +57,12 @@ pub struct SceneGpu {
     pub has_emission: bool,
     /// Name of the node, and of the material, of each draw.
     pub draw_names: Vec<[Arc<str>; 2]>,
-    /// What the CPU needs of the draws in buckets.
-    pub draw_infos: Vec<DrawInfo>,
+    /// Where its surfaces stand in the pose that it was uploaded in.
+    pub rest: Placed,
+    /// What each draw is a piece of.
+    pub draw_sources: Vec<DrawSource>,
     /// First draw of each bucket; one more entry for the end.
     pub bucket_first: [u32; BUCKETS + 1],
-    /// Draws with alpha blending.
-    pub blended: Blended,
     /// Triangles that techniques draw: those without alpha blending.
     pub triangle_count: u64,
     /// Vertices in memory.
@@ -125,8 +126,8 @@ impl SceneGpu {
             constants,
             triangle_count: draws.infos.iter().map(|d| u64::from(d.index_count / 3)).sum(),
             vertex_count: scene.positions_os.len() as u64,
-            draw_infos: draws.infos,
-            blended,
+            draw_sources: draws.sources,
+            rest: Placed { records: draws.data, infos: draws.infos, blended },
             bucket_first: draws.bucket_first,
             draws: draw_buffer,
             draw_data,
@@ -144,24 +145,13 @@ impl SceneGpu {
         self.bucket_first[BUCKETS] > self.bucket_first[BUCKETS / 2]
     }
 
-    /// Box of all surfaces without alpha blending in world space, which displacement moves along each axis at most as far as said, m.
-    pub fn bounds_ws(&self, displacement_m: f32) -> Aabb {
-        let bounds = self.draw_infos.iter().fold(Aabb::EMPTY, |bounds, draw| bounds.union(&draw.bounds_ws));
-        displaced(&bounds, displacement_m)
-    }
-
-    /// The same of all surfaces, those with alpha blending too.
-    pub fn all_bounds_ws(&self, displacement_m: f32) -> Aabb {
-        self.bounds_ws(displacement_m).union(&displaced(&self.blended.bounds_ws(), displacement_m))
-    }
-
     /// Number of draws without alpha blending: pieces of at most 1,024 triangles.
     pub fn draw_count(&self) -> usize {
-        self.draw_infos.len()
+        self.rest.infos.len()
     }
 
     /// Triangles with alpha blending.
     pub fn blended_triangle_count(&self) -> u64 {
-        self.blended.triangle_count() as u64
+        self.rest.blended.triangle_count() as u64
     }
 }

@@ -27,7 +27,7 @@ use commands::{BarrierList, BoundPass};
 use resources::{Physical, make_resources};
 
 pub use read_back::ResourceKey;
-pub use slot::{FrameSlot, FrameTimes};
+pub use slot::{FrameInput, FrameSlot, FrameTimes};
 
 /// A plan with everything that it needs on a device.
 pub struct Executor {

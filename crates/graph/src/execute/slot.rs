@@ -5,11 +5,15 @@
 
 use afterlight_gpu::{self as gpu, Device, GpuError, vk};
 
+use super::builder::image_to_buffer;
 use super::read_back::{ANY, ANY_WRITE, COPY_READ, ImageCopy};
 use super::{Executor, Marks};
 use crate::declare::ResourceId;
 use crate::error::GraphError;
 use crate::execute::resources::Physical;
+
+const COPY_WRITE: gpu::Access =
+    gpu::Access { stages: vk::PipelineStageFlags2::ALL_TRANSFER, access: vk::AccessFlags2::TRANSFER_WRITE };
 
 /// Copies of buffers begin at multiples of this, bytes.
 const COPY_ALIGNMENT: u64 = 16;
@@ -48,6 +52,59 @@ impl Places {
     }
 }
 
+/// What the host writes before each frame.
+#[derive(Clone, Debug)]
+pub enum FrameInput {
+    /// A buffer, as a whole.
+    Buffer(gpu::Buffer),
+    /// The first level and layer of a colour image in the layout `SHADER_READ_ONLY_OPTIMAL`, rows tightly packed.
+    Image(gpu::Image),
+}
+
+impl FrameInput {
+    /// Its bytes; none of an image whose format has no known size.
+    pub fn bytes(&self) -> u64 {
+        match self {
+            FrameInput::Buffer(buffer) => buffer.bytes(),
+            FrameInput::Image(image) => {
+                let [width, height] = image.extent();
+                gpu::format_info(image.format()).map_or(0, |info| info.level_bytes(width, height))
+            }
+        }
+    }
+
+    /// Records the copy from `offset` bytes on.
+    fn record(&self, encoder: &mut gpu::Encoder, from: &gpu::Buffer, offset: u64) -> Result<(), GpuError> {
+        let image = match self {
+            FrameInput::Buffer(buffer) => {
+                return encoder.copy_buffer(from, offset, buffer, 0, buffer.bytes());
+            }
+            FrameInput::Image(image) => image,
+        };
+        let color = vk::ImageAspectFlags::COLOR;
+        let mut barrier = gpu::ImageBarrier {
+            image,
+            range: vk::ImageSubresourceRange {
+                aspect_mask: color,
+                base_mip_level: 0,
+                level_count: 1,
+                base_array_layer: 0,
+                layer_count: 1,
+            },
+            before: ANY,
+            after: COPY_WRITE,
+            old_layout: vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL,
+            new_layout: vk::ImageLayout::TRANSFER_DST_OPTIMAL,
+        };
+        encoder.barriers(&[], &[], &[barrier]);
+        encoder.copy_buffer_to_image(from, image, &[image_to_buffer(image, color, 0, 0, offset)]);
+        std::mem::swap(&mut barrier.old_layout, &mut barrier.new_layout);
+        (barrier.before, barrier.after) = (COPY_WRITE, ANY);
+        encoder.barriers(&[], &[], &[barrier]);
+        Ok(())
+    }
+}
+
 /// When the device worked on a frame, nanoseconds by its own clock, and how long the passes took. All empty or `None` where it has no
 /// timestamps.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -76,7 +133,7 @@ impl Executor {
     ///
     /// # Errors
     /// An output that [`Executor::read_image`] or [`Executor::read_buffer`] would refuse, no memory, a recording that the device refuses.
-    pub fn slot(&self, inputs: &[gpu::Buffer], outputs: &[ResourceId]) -> Result<FrameSlot, GraphError> {
+    pub fn slot(&self, inputs: &[FrameInput], outputs: &[ResourceId]) -> Result<FrameSlot, GraphError> {
         let mut places = Places::default();
         inputs.iter().for_each(|input| {
             places.push(input.bytes());
@@ -118,7 +175,7 @@ impl Executor {
         let start = encoder.timestamp(vk::PipelineStageFlags2::ALL_COMMANDS)?;
         if let Some(written) = &ends.written {
             for (input, place) in &ends.inputs {
-                encoder.copy_buffer(written, place.offset, input, 0, place.bytes)?;
+                input.record(&mut encoder, written, place.offset)?;
             }
             encoder.barriers(&[gpu::MemoryBarrier { before: ANY_WRITE, after: ANY }], &[], &[]);
         }
@@ -142,7 +199,7 @@ impl Executor {
 /// What the host writes before a frame and reads after it.
 struct Ends {
     written: Option<gpu::Buffer>,
-    inputs: Vec<(gpu::Buffer, Place)>,
+    inputs: Vec<(FrameInput, Place)>,
     read: Option<gpu::Buffer>,
     outputs: Vec<(Copied, Place)>,
 }

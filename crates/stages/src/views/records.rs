@@ -148,7 +148,7 @@ impl RecordSource<'_> {
 
 /// Factor from metres to a scene that fits into [−1, 1]³.
 fn unit_from_m(frame: &Frame<'_>) -> f32 {
-    let draws = frame.scene.draw_infos.iter();
+    let draws = frame.scene.rest.infos.iter();
     let bounds = draws.fold(Aabb::EMPTY, |bounds, draw| bounds.union(&draw.bounds_ws));
     let longest_m = bounds.size().max_element();
     if longest_m > 0.0 { 2.0 / longest_m } else { 1.0 }

@@ -105,7 +105,7 @@ fn runs(params: HybridParams, view: &View<'_>) -> Vec<Run> {
 impl Draws {
     fn new(graph: &mut Graph, frame: &Frame<'_>, params: HybridParams) -> Result<Self, TechniqueError> {
         // There are no more runs than draws.
-        let most = frame.scene.draw_infos.len();
+        let most = frame.scene.draw_count();
         let named = ("hybrid draw counts", BufferRole::Scene);
         let counts = frame.table_of_view(graph, named, most, move |view| {
             runs(params, view).iter().map(|run| run.places.len() as u32).collect()

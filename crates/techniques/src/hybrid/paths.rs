@@ -66,9 +66,9 @@ pub(super) fn one_path(view: &View<'_>, path: Path) -> Vec<Run> {
 /// does.
 pub(super) fn predicted(view: &View<'_>, prepass_weight: f32) -> Vec<Run> {
     let draws: Vec<&DrawInfo> =
-        view.visible.iter().flatten().map(|draw| &view.scene.draw_infos[*draw as usize]).collect();
+        view.visible.iter().flatten().map(|draw| &view.placed.infos[*draw as usize]).collect();
     let size = [view.settings.width_px, view.settings.height_px];
-    let displacement_m = view.settings.effects.tessellation.displacement_m();
+    let displacement_m = view.displacement_m();
     let footprints: Vec<Footprint> = draws
         .iter()
         .map(|draw| Footprint::new(&draw.bounds_ws, view.camera.clip_from_world, size, displacement_m))

@@ -24,16 +24,16 @@ pub const SORTED_TRIANGLES_MAX: usize = 100_000;
 fn is_drawn(settings: &Settings, scene: &SceneGpu) -> bool {
     settings.effects.transparency.order == Transparency::Sorted
         && settings.view == views::FINAL
-        && scene.blended.triangle_count() > 0
+        && scene.rest.blended.triangle_count() > 0
 }
 
 /// Why the order is coarser than was asked for.
 pub fn warning(settings: &Settings, scene: &SceneGpu) -> Option<String> {
-    let found = scene.blended.triangle_count();
+    let found = scene.rest.blended.triangle_count();
     (is_drawn(settings, scene) && found > SORTED_TRIANGLES_MAX).then(|| {
         format!(
             "{found} triangles with alpha blending, expected at most {SORTED_TRIANGLES_MAX}: their {} draws are sorted, not they",
-            scene.blended.draw_count()
+            scene.rest.blended.draw_count()
         )
     })
 }
@@ -58,10 +58,10 @@ impl BlendedList {
         }
         let Ordered { indices, commands, draw_count } = ordered(view, cull);
         if moves {
-            let triangles = view.scene.blended.triangle_count();
+            let triangles = view.placed.blended.triangle_count();
             // A run of triangles of one draw is a command.
             let runs =
-                if triangles > SORTED_TRIANGLES_MAX { view.scene.blended.draw_count() } else { triangles };
+                if triangles > SORTED_TRIANGLES_MAX { view.placed.blended.draw_count() } else { triangles };
             return Some(Self { index_count: 3 * triangles, command_count: runs, draw_count, cull });
         }
         let (index_count, command_count) = (indices.len(), commands.len());
@@ -90,10 +90,10 @@ impl BlendedList {
 
 /// Sorts the triangles for a view.
 fn ordered(view: &View<'_>, cull: bool) -> Ordered {
-    view.scene.blended.order(&ViewOrder {
+    view.placed.blended.order(&ViewOrder {
         cull: cull.then_some(view.camera.clip_from_world),
         distance_from_world: view.camera.distance_from_world(),
-        displacement_m: view.settings.effects.tessellation.displacement_m(),
+        displacement_m: view.displacement_m(),
         triangles_max: SORTED_TRIANGLES_MAX,
     })
 }

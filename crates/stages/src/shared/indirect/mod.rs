@@ -53,8 +53,9 @@ impl SceneInput for Rsm {
 
 /// Why there is no indirect light though it was asked for.
 pub fn warning(settings: &Settings, scene: &SceneGpu) -> Option<String> {
-    (settings.effects.indirect.method == Indirect::Rsm && light_view::source(scene, settings).is_none())
-        .then(|| "no indirect light: the scene has no light, or no surface, to take it from".to_owned())
+    (settings.effects.indirect.method == Indirect::Rsm
+        && light_view::source_at_rest(scene, settings).is_none())
+    .then(|| "no indirect light: the scene has no light, or no surface, to take it from".to_owned())
 }
 
 /// The pattern of all pixels (section 4.1): Hammersley points (ξ1, ξ2) at radius ξ1 and angle 2π ξ2, weighted by ξ1², the weights
@@ -79,24 +80,30 @@ pub fn pattern() -> [[f32; 3]; SAMPLES] {
 pub fn record(graph: &mut Graph, frame: &mut Frame<'_>, settings: &Settings) -> Result<(), TechniqueError> {
     let source = match settings.effects.indirect.method {
         Indirect::None => None,
-        Indirect::Rsm => light_view::source(frame.scene, settings),
+        Indirect::Rsm => light_view::source_at_rest(frame.scene, settings),
     };
-    let mut constants = RsmConstants::default();
+    let size_px = settings.effects.indirect.map_size_px;
     let images = match &source {
         None => None,
         Some(source) => {
-            constants.clip_from_world = source.clip_from_world().to_cols_array_2d();
-            let area_m2 = (2.0 * source.half_height()).powi(2);
-            constants.samples = pattern().map(|[x, y, share]| [x, y, share * area_m2, 0.0]);
-            let size_px = settings.effects.indirect.map_size_px;
-            let pass = ("shared/rsm", size_px);
-            Some(light_view::look_through(graph, frame, settings, source, pass, |graph, frame| {
-                raster(graph, frame, size_px, frame.lights.index_of(&source.light))
+            // The strongest light stays that, wherever surfaces stand.
+            let light_index = frame.lights.index_of(&source.light);
+            Some(light_view::look_through(graph, frame, ("shared/rsm", size_px), |graph, frame| {
+                raster(graph, frame, size_px, light_index)
             })?)
         }
     };
-    let buffer = light_view::upload(frame.device, "shared/rsm constants", &constants)?;
-    let constants = graph.import_buffer("shared/rsm constants", BufferRole::Constants, &buffer);
+    let is_there = images.is_some();
+    let constants = light_view::constants_of_pose(graph, frame, "shared/rsm constants", move |view| {
+        let source = light_view::source(view).filter(|_| is_there);
+        source.map_or_else(RsmConstants::default, |source| {
+            let area_m2 = (2.0 * source.half_height()).powi(2);
+            RsmConstants {
+                clip_from_world: source.clip_from_world().to_cols_array_2d(),
+                samples: pattern().map(|[x, y, share]| [x, y, share * area_m2, 0.0]),
+            }
+        })
+    })?;
     if images.is_some() {
         frame.board.put(IndirectLight { sample_count: SAMPLES as u32 });
     }

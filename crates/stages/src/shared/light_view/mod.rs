@@ -1,18 +1,17 @@
 //! A light's view of the scene: which light it is, and how a frame looks through it. What indirect light is gathered from
 //! (`shared/indirect/`) and shadows (`shared/shadow/`) are passes through it.
 
-use std::f32::consts::PI;
+use std::{borrow::Cow, f32::consts::PI};
 
-use afterlight_graph::{
-    BufferRole, Graph,
-    gpu::{self, vk},
-};
+use afterlight_graph::{BufferHandle, BufferRole, Graph, gpu::vk};
 use afterlight_scene::{Aabb, Camera, Light, LightKind, Projection};
+use afterlight_shader::structs::FrameConstants;
+use bytemuck::Zeroable as _;
 use glam::{Mat4, Vec3};
 
 use afterlight_frame::{
-    CameraView, DrawParams, Frame, SceneGpu, Settings, TechniqueError,
-    scene::draw_list::{DrawChoice, DrawList},
+    CameraView, ChangesWith, DrawParams, Frame, SceneGpu, Settings, TechniqueError, View, put,
+    scene::draw_list::DrawChoice,
 };
 
 /// Widest angle of a light's perspective view, radians: further out a texel has hardly any solid angle.
@@ -98,56 +97,67 @@ fn perspective_view(light: &Light, target_ws: Vec3, angle_rad: f32, bounds_ws: &
     Camera::look_at("light", light.position_ws, target_ws, angle_rad.max(1e-3), near_m)
 }
 
-/// The light of a scene's settings, and its view; `None` without a light or a surface. Displaced surfaces are in view too.
-pub fn source(scene: &SceneGpu, settings: &Settings) -> Option<SourceView> {
-    SourceView::choose(&settings.lights, &scene.bounds_ws(settings.effects.tessellation.displacement_m()))
+/// The light of a view's settings, and what it sees; `None` without a light or a surface. Displaced surfaces are in view too.
+pub fn source(view: &View<'_>) -> Option<SourceView> {
+    SourceView::choose(&view.settings.lights, &view.bounds_ws())
 }
 
-/// Uploads constants of a shader.
+/// The same of a scene as it was uploaded.
+pub fn source_at_rest(scene: &SceneGpu, settings: &Settings) -> Option<SourceView> {
+    let displacement_m = settings.effects.tessellation.displacement_m();
+    SourceView::choose(&settings.lights, &scene.rest.bounds_ws(displacement_m))
+}
+
+/// Constants of a shader that `of_source` computes from the light's view of each pose.
 ///
 /// # Errors
 /// The device.
-pub fn upload<T: bytemuck::NoUninit>(
-    device: &gpu::Device,
+pub fn constants_of_pose<T: bytemuck::NoUninit>(
+    graph: &mut Graph,
+    frame: &Frame<'_>,
     name: &str,
-    data: &T,
-) -> Result<gpu::Buffer, gpu::GpuError> {
-    let buffer = device.create_buffer(&gpu::BufferDesc {
-        name,
-        bytes: size_of::<T>() as u64,
-        usage: vk::BufferUsageFlags::UNIFORM_BUFFER,
-        memory: gpu::MemoryKind::Upload,
-    })?;
-    buffer.write(0, bytemuck::bytes_of(data))?;
-    Ok(buffer)
+    of_source: impl Fn(&View<'_>) -> T + Send + Sync + 'static,
+) -> Result<BufferHandle, TechniqueError> {
+    let named = (name, BufferRole::Constants);
+    let usage = vk::BufferUsageFlags::UNIFORM_BUFFER;
+    frame.of_pose(graph, named, size_of::<T>() as u64, usage, move |view, bytes| {
+        put(bytes, 0, &[of_source(view)]);
+    })
 }
 
-/// Lets the frame look through a light, `size_px` texels a side, while `declare` declares passes: constants, and draws culled
-/// by that view. Their buffers are named after `pass`.
+/// The settings and the camera of a frame through the light, `size_px` texels a side.
+fn through(view: &View<'_>, size_px: u32) -> Option<(Settings, CameraView)> {
+    let camera = source(view)?.camera;
+    let settings = Settings { camera, width_px: size_px, height_px: size_px, ..view.settings.clone() };
+    let camera = CameraView::new(&settings);
+    Some((settings, camera))
+}
+
+/// Lets the frame look through the light of its settings ([`source`]), `size_px` texels a side, while `declare` declares passes: constants,
+/// and draws culled by that view. Their buffers are named after `pass`.
 ///
 /// # Errors
 /// Those of `declare`, the device.
 pub fn look_through<T>(
     graph: &mut Graph,
     frame: &mut Frame<'_>,
-    settings: &Settings,
-    source: &SourceView,
     (pass, size_px): (&str, u32),
     declare: impl FnOnce(&mut Graph, &Frame<'_>) -> Result<T, TechniqueError>,
 ) -> Result<T, TechniqueError> {
-    let settings =
-        Settings { camera: source.camera.clone(), width_px: size_px, height_px: size_px, ..settings.clone() };
-    let view = CameraView::new(&settings);
-    let mut choice = DrawChoice::new(DrawParams::default());
-    choice.update(frame.scene, &view, settings.effects.tessellation.displacement_m());
-    let draws = DrawList::new(frame.device, frame.scene, &choice)?;
-    let name = format!("{pass} view");
-    let constants = upload(frame.device, &name, &view.constants(&settings, frame.lights, frame.scene))?;
-    let imported = [
-        graph.import_buffer(&name, BufferRole::Constants, &constants),
-        graph.import_buffer(&format!("{pass} draw commands"), BufferRole::Scene, &draws.commands),
-        graph.import_buffer(&format!("{pass} draw counts"), BufferRole::Scene, &draws.counts),
-    ];
+    let constants = constants_of_pose(graph, frame, &format!("{pass} view"), move |view| {
+        through(view, size_px).map_or_else(FrameConstants::zeroed, |(settings, camera)| {
+            camera.constants(&settings, view.lights, &view.bounds_ws())
+        })
+    })?;
+    let named = (&*format!("{pass} draw"), ChangesWith::Pose);
+    let draws = frame.inputs.declare_draws(frame.device, graph, named, frame.scene, move |view| {
+        let mut choice = DrawChoice::new(DrawParams::default());
+        if let Some((_, camera)) = through(view, size_px) {
+            choice.update(view.scene, &view.placed.infos, &camera, view.displacement_m());
+        }
+        Cow::Owned(choice.visible)
+    })?;
+    let imported = [constants, draws.commands, draws.counts];
     let b = &mut frame.buffers;
     let [constants, commands, counts] = imported;
     let eye = [

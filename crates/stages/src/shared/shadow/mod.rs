@@ -12,7 +12,7 @@ use crate::{
     shared::light_view::{self, SourceView},
     surfaces::geometry::SceneDraws,
 };
-use afterlight_frame::{Frame, SceneGpu, SceneInput, Settings, Shadows, Slots, TechniqueError};
+use afterlight_frame::{Frame, SceneGpu, SceneInput, Settings, ShadowEffect, Shadows, Slots, TechniqueError};
 
 /// How far from a point the filter reads along each axis, at most, texels: it covers a texel to each side of the point, and the
 /// centre of a texel is half a texel from where it begins.
@@ -43,7 +43,7 @@ impl SceneInput for Shadow {
 
 /// Why there are no shadows though they were asked for.
 pub fn warning(settings: &Settings, scene: &SceneGpu) -> Option<String> {
-    (settings.effects.shadows.method == Shadows::Map && light_view::source(scene, settings).is_none())
+    (settings.effects.shadows.method == Shadows::Map && light_view::source_at_rest(scene, settings).is_none())
         .then(|| "no shadows: the scene has no light, or no surface, to cast them".to_owned())
 }
 
@@ -52,29 +52,23 @@ pub fn warning(settings: &Settings, scene: &SceneGpu) -> Option<String> {
 /// # Errors
 /// A shader that is not compiled in, the device.
 pub fn record(graph: &mut Graph, frame: &mut Frame<'_>, settings: &Settings) -> Result<(), TechniqueError> {
-    let source = match settings.effects.shadows.method {
-        Shadows::None => None,
-        Shadows::Map => light_view::source(frame.scene, settings),
+    let ShadowEffect { method, map_size_px: size_px, bias } = settings.effects.shadows;
+    let is_cast = method == Shadows::Map && light_view::source_at_rest(frame.scene, settings).is_some();
+    let map = match is_cast {
+        false => None,
+        true => Some(light_view::look_through(graph, frame, ("shared/shadow", size_px), |graph, frame| {
+            raster(graph, frame, size_px, bias)
+        })?),
     };
-    let mut constants = ShadowConstants::default();
-    let map = match &source {
-        None => None,
-        Some(source) => {
-            let size_px = settings.effects.shadows.map_size_px;
-            let nearer_texels = NEARER_TEXELS * settings.effects.shadows.bias;
-            constants = ShadowConstants {
-                texel_from_world: texel_from_world(source, size_px, nearer_texels).to_cols_array_2d(),
-                light_index: frame.lights.index_of(&source.light),
-                size_px,
-            };
-            let pass = ("shared/shadow", size_px);
-            Some(light_view::look_through(graph, frame, settings, source, pass, |graph, frame| {
-                raster(graph, frame, size_px, settings.effects.shadows.bias)
-            })?)
-        }
-    };
-    let buffer = light_view::upload(frame.device, "shared/shadow constants", &constants)?;
-    let constants = graph.import_buffer("shared/shadow constants", BufferRole::Constants, &buffer);
+    let nearer_texels = NEARER_TEXELS * bias;
+    let constants = light_view::constants_of_pose(graph, frame, "shared/shadow constants", move |view| {
+        let source = light_view::source(view).filter(|_| is_cast);
+        source.map_or_else(ShadowConstants::default, |source| ShadowConstants {
+            texel_from_world: texel_from_world(&source, size_px, nearer_texels).to_cols_array_2d(),
+            light_index: view.lights.index_of(&source.light),
+            size_px,
+        })
+    })?;
     frame.board.add_input(Shadow { constants, map });
     Ok(())
 }
