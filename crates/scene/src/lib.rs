@@ -16,6 +16,7 @@ mod model;
 mod mtl;
 mod obj;
 mod origin;
+mod path;
 pub mod points;
 mod pose;
 pub mod rng;
