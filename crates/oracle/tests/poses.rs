@@ -4,9 +4,9 @@
 use std::path::{Path, PathBuf};
 
 use afterlight_oracle::deform::{posed_vertices, posed_vertices_ws};
-use afterlight_scene::{LoadOptions, Scene, load};
+use afterlight_scene::{LoadOptions, Pose, Scene, load};
 use base64::Engine;
-use glam::{DMat3, DMat4, DQuat, DVec3, DVec4};
+use glam::{Affine3A, DMat3, DMat4, DQuat, DVec3, DVec4};
 use serde_json::Value;
 
 /// A glTF file as the test reads it.
@@ -196,7 +196,7 @@ impl Document {
 
     /// Corners of the triangles of everything drawn: for each draw position and normal of each corner. A normal is `None` where the file
     /// has none, or where it is so short that its direction says little.
-    fn draws(&self, time_s: f64) -> Vec<Vec<(DVec3, Option<DVec3>)>> {
+    fn draws(&self, time_s: f64) -> Vec<Corners> {
         let nodes = self.nodes(time_s);
         let world = |node: usize| nodes.iter().find(|n| n.0 == node).expect("a joint of the scene").1;
         let mut out = Vec::new();
@@ -337,18 +337,83 @@ fn every_sample_that_moves_is_where_its_file_says() {
     assert!(count[0] >= 30 && count[1] >= 10 && count[2] >= 8, "found {count:?} samples");
 }
 
+/// A scene whose twin forgets something is seen to be off, in every sample that has it.
+#[test]
+fn what_is_forgotten_shows() {
+    let Some(samples) = moving_samples() else { return };
+    let mut count = [0; 3];
+    for file in samples {
+        let Ok(scene) = load(&file, &LoadOptions::default()) else { continue };
+        let document = Document::read(&file);
+        let time_s = 0.371 * document.duration_s();
+        let expected = document.draws(time_s);
+        let pose = scene.pose_at(time_s);
+        let is_off = |scene: &Scene, pose: &Pose| {
+            let size_m = size_m(&expected);
+            let off_m = (0..expected.len()).map(|k| off_m(scene, pose, k, &expected[k])).fold(0.0, f64::max);
+            off_m > BOUND * size_m
+        };
+        assert!(!is_off(&scene, &pose), "{}", file.display());
+        let binds = scene.skins.iter().flat_map(|skin| &skin.joint_from_bind);
+        if binds.clone().any(|m| !m.abs_diff_eq(Affine3A::IDENTITY, 0.01)) {
+            let mut forgetful = scene.clone();
+            forgetful.skins.iter_mut().for_each(|skin| skin.joint_from_bind.fill(Affine3A::IDENTITY));
+            assert!(
+                is_off(&forgetful, &forgetful.pose_at(time_s)),
+                "{}: inverse bind matrices",
+                file.display()
+            );
+            count[0] += 1;
+        }
+        if pose.weights.iter().any(|weight| *weight > 0.05) {
+            let mut still = pose.clone();
+            still.weights.fill(0.0);
+            assert!(is_off(&scene, &still), "{}: weights of morph targets", file.display());
+            count[1] += 1;
+        }
+        // The pose of a frame before.
+        let before = scene.pose_at(0.9 * time_s).object_from_bind;
+        let joints = pose.object_from_bind.iter().zip(&before);
+        if joints.into_iter().any(|(a, b)| !a.abs_diff_eq(*b, 0.01 * a.translation.length().max(1.0))) {
+            let mut late = pose.clone();
+            late.object_from_bind = before;
+            assert!(is_off(&scene, &late), "{}: joints", file.display());
+            count[2] += 1;
+        }
+    }
+    assert!(count.iter().all(|&n| n >= 3), "found {count:?} samples");
+}
+
 /// Distance that is allowed, as a fraction of the extent of what is drawn.
 const BOUND: f64 = 1e-5;
+
+/// What is drawn, as [`Document::draws`] gives it.
+type Corners = Vec<(DVec3, Option<DVec3>)>;
+
+/// Extent of what is drawn, metres. Where it stands far from the origin, 32 bits of its places are what there is.
+fn size_m(expected: &[Corners]) -> f64 {
+    let all = expected.iter().flatten().map(|corner| corner.0);
+    let (min, max) = all.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |b, p| (b.0.min(p), b.1.max(p)));
+    (max - min).max_element().max(0.1 * min.abs().max(max.abs()).max_element())
+}
+
+/// The greatest distance of an instance's corners in a pose to where they are to be, metres.
+fn off_m(scene: &Scene, pose: &Pose, instance: usize, expected: &[(DVec3, Option<DVec3>)]) -> f64 {
+    let mesh = &scene.meshes[scene.instances[instance].mesh as usize];
+    let found = posed_vertices_ws(scene, pose, instance);
+    let indices = &scene.indices[mesh.first_index as usize..(mesh.first_index + mesh.index_count) as usize];
+    let off = |(&k, (position, _)): (&u32, &(DVec3, Option<DVec3>))| {
+        (found[k as usize].position + scene.origin_file - *position).length()
+    };
+    indices.iter().zip(expected).map(off).fold(0.0, f64::max)
+}
 
 fn compare(file: &Path, scene: &mut Scene, document: &Document, time_s: f64, local_s: f64) {
     let at = |text: &str| format!("{} at {time_s} s: {text}", file.display());
     let pose = scene.pose_at(time_s);
     let expected = document.draws(local_s);
     assert_eq!(expected.len(), scene.instances.len(), "{}", at("draws"));
-    let all = expected.iter().flatten().map(|corner| corner.0);
-    let (min, max) = all.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |b, p| (b.0.min(p), b.1.max(p)));
-    // Where things stand far from the origin, 32 bits of their places are what there is.
-    let size_m = (max - min).max_element().max(0.1 * min.abs().max(max.abs()).max_element());
+    let size_m = size_m(&expected);
     for (instance, expected) in expected.iter().enumerate() {
         let mesh = &scene.meshes[scene.instances[instance].mesh as usize];
         let indices =

@@ -178,7 +178,7 @@ impl Shape {
 
     fn morphed(&self, vertex: usize, weights: &[f32]) -> PosedVertex {
         let wide = |v: [f32; 3]| DVec3::from_array(v.map(f64::from));
-        let [normal_os_oct, tangent_os_oct] = self.frames_os[vertex];
+        let [normal_os_oct, tangent_os_oct] = self.frames_os.get(vertex).copied().unwrap_or_default();
         let packed = VertexAttributes { normal_os_oct, tangent_os_oct, ..Default::default() };
         let (tangent_os, handedness) = packed.tangent_os();
         let mut out = PosedVertex {
@@ -207,7 +207,7 @@ impl Shape {
         let (mut matrix, mut translation) = (DMat3::ZERO, DVec3::ZERO);
         for (joint, weight) in self.influences_of(vertex).iter().flat_map(Influences::iter) {
             let Some(joint) = object_from_bind.get(joint) else { continue };
-            matrix += DMat3::from(joint.matrix3.as_dmat3()) * weight;
+            matrix += joint.matrix3.as_dmat3() * weight;
             translation += joint.translation.as_dvec3() * weight;
         }
         // The cofactors are the inverse transpose times the determinant; they stand also where there is no inverse.
@@ -311,16 +311,23 @@ impl Scene {
             else {
                 continue;
             };
-            let first = mesh.first_vertex as usize;
+            let range = mesh.first_vertex as usize..mesh.first_vertex as usize + mesh.vertex_count as usize;
+            let (Some(positions_os), Some(attributes)) =
+                (self.positions_os.get_mut(range.clone()), self.attributes.get_mut(range))
+            else {
+                continue;
+            };
             mesh.bounds_os = Aabb::EMPTY;
-            for (vertex, v) in shape.posed(weights, joints).into_iter().enumerate() {
+            let drawn = positions_os.iter_mut().zip(attributes);
+            for (vertex, (v, (position, attributes))) in
+                shape.posed(weights, joints).into_iter().zip(drawn).enumerate()
+            {
                 let position_os = v.position_os.as_vec3();
                 if !position_os.is_finite() && overflow.is_none() {
                     overflow = Some((d.mesh, vertex));
                 }
                 mesh.bounds_os.extend(position_os);
-                self.positions_os[first + vertex] = position_os.to_array();
-                let attributes = &mut self.attributes[first + vertex];
+                *position = position_os.to_array();
                 let (normal_os, tangent_os) = (v.normal_os.as_vec3(), v.tangent_os.as_vec3());
                 [attributes.normal_os_oct, attributes.tangent_os_oct] =
                     VertexAttributes::pack_frame(normal_os, tangent_os, v.handedness);

@@ -272,7 +272,7 @@ fn cameras_and_lights_move_with_their_nodes() {
 }
 
 fn refused(result: Result<Scene, SceneError>, parts: &[&str]) {
-    let text = result.err().expect("is refused").to_string();
+    let text = result.expect_err("is refused").to_string();
     assert!(parts.iter().all(|part| text.contains(part)) && !text.contains('\n'), "{text}");
 }
 
@@ -381,7 +381,7 @@ fn scenes_without_deformation_keep_nothing_for_it() {
         let worlds: Vec<Affine3A> = posed.instances.iter().map(|i| i.world_from_object).collect();
         assert_eq!(pose.world_from_object, worlds, "{source}");
     }
-    assert_eq!(std::mem::size_of::<afterlight_scene::Instance>(), 80, "as before there were skins");
+    assert_eq!(size_of::<afterlight_scene::Instance>(), 80, "as before there were skins");
 }
 
 /// A skin far from the origin of the file, bent: as exact as near it.

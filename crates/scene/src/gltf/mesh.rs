@@ -310,22 +310,22 @@ fn check_size(accessors: &Accessors, plan: &Plan) -> Result<(), SceneError> {
     let vertex_count = |s: &Streams| accessors.layouts[s.positions].count as u64;
     let mut vertices: u64 = plan.streams.iter().map(vertex_count).sum();
     let mut indices = 0;
-    // a shape is about as large as its vertices, and so is each of its targets
-    for &job in &plan.shapes {
-        let job = &plan.jobs[job];
-        let lists = 1 + job.primitive.targets.as_ref().map_or(0, Vec::len) as u64;
-        vertices = vertices.saturating_add(vertex_count(&job.streams).saturating_mul(lists));
-    }
-    for job in &plan.jobs {
+    let list_count = |job: &Job| {
         let corner_count = match job.primitive.indices {
             Some(a) => accessors.layouts[a.value()].count as u64,
             None => vertex_count(&job.streams),
         };
-        let list_count = if job.primitive.mode == Checked::Valid(Mode::Triangles) {
-            corner_count
-        } else {
-            3 * corner_count
-        };
+        if job.primitive.mode == Checked::Valid(Mode::Triangles) { corner_count } else { 3 * corner_count }
+    };
+    // a shape is about as large as its vertices, and so is each of its targets
+    for &job in &plan.shapes {
+        let job = &plan.jobs[job];
+        let lists = 1 + job.primitive.targets.as_ref().map_or(0, Vec::len) as u64;
+        let count = vertex_count(&job.streams).max(list_count(job));
+        vertices = vertices.saturating_add(count.saturating_mul(lists));
+    }
+    for job in &plan.jobs {
+        let list_count = list_count(job);
         indices += list_count;
         if job.shared.is_none() {
             vertices += vertex_count(&job.streams).max(list_count);

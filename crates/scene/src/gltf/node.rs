@@ -22,7 +22,11 @@ use crate::{
     pose,
 };
 
-/// Most nodes and most draws of a scene: instancing lets a short file ask for many.
+/// What is counted against [`INSTANCE_COUNT_MAX`], for messages.
+const NODES: &str = "nodes and draws";
+
+/// Most nodes and most draws of a scene: instancing lets a short file ask for many. So many matrices of joints and weights as well: a short
+/// file can draw one mesh with many joints or targets many times.
 const INSTANCE_COUNT_MAX: u64 = 1 << 22;
 
 /// Translation, rotation and scale.
@@ -190,6 +194,7 @@ pub(super) fn find_draws(
     let mut plain: HashMap<usize, usize> = HashMap::new();
     let mut skins: HashMap<usize, u32> = HashMap::new();
     let mut variants: Vec<Variant> = Vec::new();
+    let (mut matrix_count, mut weight_count) = (0, 0);
     let mut draws = Vec::new();
     for &index in &placement.order {
         let node = &root.nodes[index];
@@ -222,6 +227,12 @@ pub(super) fn find_draws(
             scene.nodes.push(Node { name, parent: None, local: DAffine3::from_translation(origin) });
         }
         let draw_node = variant.object_node;
+        if let Some(skin) = variant.skin {
+            matrix_count += scene.skins[skin as usize].joints.len();
+            check_count(accessors.file, "matrices of joints", matrix_count)?;
+        }
+        weight_count += target_count;
+        check_count(accessors.file, "weights of morph targets", weight_count)?;
         // A mesh has one shape at a time: nodes that can be shaped in ways of their own have vertices of their own.
         let own_weights = target_count > 0 && (node.weights.is_some() || animated.contains(&place));
         let variant = if skin.is_some() || own_weights {
@@ -240,7 +251,7 @@ pub(super) fn find_draws(
                 let at = format!("nodes[{index}].extensions.{INSTANCING}");
                 let instances = instance_transforms(accessors, &at, extension)?;
                 let name = scene.nodes[place as usize].name.clone();
-                check_count(accessors.file, scene.nodes.len() + instances.len())?;
+                check_count(accessors.file, NODES, scene.nodes.len() + instances.len())?;
                 for (k, trs) in instances.into_iter().enumerate() {
                     let node = scene.nodes.len() as u32;
                     scene.nodes.push(Node {
@@ -258,9 +269,9 @@ pub(super) fn find_draws(
 
 const INSTANCING: &str = "EXT_mesh_gpu_instancing";
 
-fn check_count(file: &Path, count: usize) -> Result<(), SceneError> {
+fn check_count(file: &Path, what: &str, count: usize) -> Result<(), SceneError> {
     if count as u64 > INSTANCE_COUNT_MAX {
-        let what = "nodes and draws".to_owned();
+        let what = what.to_owned();
         return Err(SceneError::TooLarge {
             file: file.to_owned(),
             what,
@@ -347,7 +358,7 @@ fn instance_transforms(
             "as many in each",
         ));
     }
-    check_count(file, count)?;
+    check_count(file, NODES, count)?;
     let vec3 = |a: Option<usize>, rest: f32| {
         a.map_or(Ok(vec![[rest; 3]; count]), |a| accessors.floats::<3>(a, 3, 0.0))
     };
@@ -394,7 +405,7 @@ pub(super) fn make_instances(
                 "finite numbers",
             ));
         }
-        check_count(file, scene.instances.len() + meshes[draw.variant].len())?;
+        check_count(file, NODES, scene.instances.len() + meshes[draw.variant].len())?;
         let instance = |mesh| Instance { mesh, node: draw.node, world_from_object: world };
         scene.instances.extend(meshes[draw.variant].clone().map(instance));
         worlds.resize(scene.instances.len(), file_from_object);
@@ -544,8 +555,8 @@ mod tests {
     #[test]
     fn a_scene_has_at_most_4_million_nodes_and_draws() {
         let file = Path::new("test.gltf");
-        assert!(check_count(file, 1 << 22).is_ok());
-        let error = check_count(file, (1 << 22) + 1).expect_err("one more").to_string();
+        assert!(check_count(file, NODES, 1 << 22).is_ok());
+        let error = check_count(file, NODES, (1 << 22) + 1).expect_err("one more").to_string();
         assert!(error.contains("found 4194305, expected at most 4194304"), "{error}");
     }
 }
