@@ -4,9 +4,12 @@
 use std::path::{Path, PathBuf};
 
 use afterlight_oracle::deform::{posed_vertices, posed_vertices_ws};
-use afterlight_scene::{LoadOptions, Pose, Scene, load};
+use afterlight_scene::{
+    Deformation, Influences, Instance, LoadOptions, Mesh, MorphTarget, Node, Pose, Scene, Shape, Skin,
+    VertexAttributes, load,
+};
 use base64::Engine;
-use glam::{Affine3A, DMat3, DMat4, DQuat, DVec3, DVec4};
+use glam::{Affine3A, DAffine3, DMat3, DMat4, DQuat, DVec3, DVec4, Vec2, Vec3};
 use serde_json::Value;
 
 /// A glTF file as the test reads it.
@@ -335,6 +338,96 @@ fn every_sample_that_moves_is_where_its_file_says() {
         }
     }
     assert!(count[0] >= 30 && count[1] >= 10 && count[2] >= 8, "found {count:?} samples");
+}
+
+/// A triangle put together by code, held by two joints; where it lies, and what blends of matrices do to its frame, is known.
+#[test]
+fn frames_turn_as_is_known() {
+    let corner = VertexAttributes::pack(Vec3::Z, Vec3::X, 1.0, Vec2::ZERO, Vec2::ZERO, [1.0; 4]);
+    let half = Influences { joints: [0, 1, 0, 0], weights: [0.5, 0.5, 0.0, 0.0] };
+    let mut shape = Shape {
+        positions_os: vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+        frames_os: vec![[corner.normal_os_oct, corner.tangent_os_oct]; 3],
+        set_count: 1,
+        influences: vec![half; 3],
+        targets: [MorphTarget::new(vec![[0.0, 0.0, 2.0]; 3], vec![[1.0, 0.0, 0.0]; 3], Vec::new())].into(),
+        ..Shape::default()
+    };
+    shape.find_bounds();
+    let mesh = Mesh {
+        name: "triangle".to_owned(),
+        first_index: 0,
+        index_count: 3,
+        first_vertex: 0,
+        vertex_count: 3,
+        material: 0,
+        bounds_os: shape.bounds_os,
+    };
+    let node = Node { name: String::new(), parent: None, local: DAffine3::IDENTITY };
+    let skin =
+        Skin { name: "two".to_owned(), joints: vec![0, 0], joint_from_bind: vec![Affine3A::IDENTITY; 2] };
+    let deformation = Deformation {
+        mesh: 0,
+        shape: 0,
+        object_node: 0,
+        weights_node: 0,
+        skin: Some(0),
+        first_joint: 0,
+        first_weight: 0,
+    };
+    let scene = Scene {
+        positions_os: shape.positions_os.clone(),
+        attributes: vec![corner; 3],
+        indices: vec![0, 1, 2],
+        meshes: vec![mesh],
+        nodes: vec![node],
+        instances: vec![Instance {
+            mesh: 0,
+            node: 0,
+            world_from_object: Affine3A::from_translation(Vec3::X),
+        }],
+        skins: vec![skin],
+        shapes: vec![shape],
+        deformations: vec![deformation],
+        rest_weights: vec![0.0],
+        ..Scene::default()
+    };
+    let scaled = |x: f32, y: f32, z: f32| Affine3A::from_scale(Vec3::new(x, y, z));
+    // Joints, weight of the target; position of the second corner in world space, normal, sign of the bitangent.
+    for (joints, weight, position, normal, handedness) in [
+        ([scaled(1.0, 1.0, 1.0); 2], 0.0, [2.0, 0.0, 0.0], [0.0, 0.0, 1.0], 1.0),
+        // Morphed first, then moved: the target's 2 m are 4.
+        ([scaled(1.0, 1.0, 2.0); 2], 1.0, [2.0, 0.0, 4.0], [2.0, 0.0, 1.0], 1.0),
+        // The mean of a scale of 4 and none along X: normals lean the other way.
+        ([scaled(4.0, 1.0, 1.0), scaled(0.0, 1.0, 1.0)], 1.0, [3.0, 0.0, 2.0], [0.5, 0.0, 1.0], 1.0),
+        // A mirror.
+        ([scaled(-1.0, 1.0, 1.0); 2], 0.0, [0.0, 0.0, 0.0], [0.0, 0.0, 1.0], -1.0),
+        // Two opposite joints leave nothing of one axis: the cofactors still tell the normal.
+        ([scaled(1.0, 1.0, 1.0), scaled(1.0, 1.0, -1.0)], 0.0, [2.0, 0.0, 0.0], [0.0, 0.0, 1.0], 1.0),
+    ] {
+        let mut pose = scene.pose_at(0.0);
+        (pose.object_from_bind, pose.weights) = (joints.to_vec(), vec![weight]);
+        let found = posed_vertices_ws(&scene, &pose, 0)[1];
+        let normal = DVec3::from_array(normal).normalize();
+        assert!(
+            (found.position - DVec3::from_array(position)).length() < 1e-9,
+            "{joints:?}: {}",
+            found.position
+        );
+        assert!((found.normal - normal).length() < 1e-4, "{joints:?}: {}, expected {normal}", found.normal);
+        assert_eq!(found.handedness, handedness, "{joints:?}");
+        let mut own = scene.clone();
+        own.take_pose(&pose);
+        let (tangent, sign) = own.attributes[1].tangent_os();
+        assert!((own.attributes[1].normal_os().as_dvec3() - normal).length() < 2e-4, "{joints:?}");
+        assert!(
+            (tangent.as_dvec3() - found.tangent).length() < 3e-4 && f64::from(sign) == handedness,
+            "{joints:?}: {tangent}"
+        );
+        let bounds = scene.bounds_in_pose(&pose, 0);
+        let p = found.position.as_vec3();
+        assert!(p.cmpge(bounds.min).all() && p.cmple(bounds.max).all(), "{p} {bounds:?}");
+    }
 }
 
 /// A scene whose twin forgets something is seen to be off, in every sample that has it.

@@ -320,6 +320,24 @@ fn broken_skins_and_weights_are_told() {
     refused(d.load(), &["nodes[0].weights", "found 1", "expected 2"]);
 }
 
+/// A short file that draws one mesh with many joints many times.
+#[test]
+fn a_scene_has_at_most_4_million_joint_matrices() {
+    let mut d = bar(&[0.0, 1.0, 2.0], &HELD);
+    d.json["skins"][0]["joints"] = json!(vec![1; 2048]);
+    d.json["skins"][0].as_object_mut().unwrap().remove("inverseBindMatrices");
+    let joints = d.json["nodes"].as_array().unwrap()[1..].to_vec();
+    let mut load = |count: usize| {
+        let drawn = (0..count).map(|_| json!({"mesh": 0, "skin": 0}));
+        let nodes: Vec<_> = [json!({})].into_iter().chain(joints.clone()).chain(drawn).collect();
+        d.json["scenes"] = json!([{"nodes": (0..nodes.len()).filter(|k| *k != 2).collect::<Vec<_>>()}]);
+        d.json["nodes"] = json!(nodes);
+        d.load()
+    };
+    assert_eq!(load(3).unwrap().pose_at(0.0).object_from_bind.len(), 3 * 2048);
+    refused(load(2049), &["matrices of joints", "found 4196352", "at most 4194304"]);
+}
+
 #[test]
 fn repairs_are_told() {
     let warned = |scene: &Scene, part: &str| {

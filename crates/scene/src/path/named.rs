@@ -49,7 +49,7 @@ const ROUTES: &[Route] = &[
             ([-10.0, 2.6, 0.6], [-13.5, 2.4, -2.6]),
         ],
     },
-    // From the fountain through the arch that no drape closes, into the aisle.
+    // From the end of an aisle through the arch that no drape closes, to the fountain.
     Route {
         name: "arcade",
         scene: "builtin:colonnade",
@@ -59,12 +59,13 @@ const ROUTES: &[Route] = &[
         near_m: 0.05,
         fov_deg: 62.0,
         places: &[
-            ([-2.6, 1.9, 1.3], [-7.0, 2.2, -0.6]),
-            ([-5.8, 1.8, 0.3], [-9.5, 2.0, -3.0]),
-            ([-8.4, 1.75, -1.4], [-9.8, 1.9, -5.2]),
-            ([-9.14, 1.7, -3.0], [-11.0, 1.8, -5.4]),
-            ([-9.9, 1.7, -4.3], [-13.6, 1.8, -5.0]),
-            ([-12.4, 1.75, -4.75], [-16.4, 1.9, -4.8]),
+            ([-12.8, 1.75, -4.8], [-8.4, 2.2, -3.4]),
+            ([-10.6, 1.7, -4.6], [-7.0, 2.1, -1.6]),
+            ([-9.4, 1.7, -3.9], [-7.2, 2.0, 0.4]),
+            ([-9.1, 1.7, -2.8], [-6.0, 2.0, 1.2]),
+            ([-8.0, 1.75, -1.3], [-2.5, 2.2, 1.2]),
+            ([-5.6, 1.8, 0.4], [-0.2, 2.0, 0.2]),
+            ([-2.9, 1.9, 1.4], [0.6, 1.6, -0.4]),
         ],
     },
     // Along the hall under the banners, back a storey higher between them.
