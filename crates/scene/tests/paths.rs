@@ -11,6 +11,7 @@ use afterlight_scene::{
 };
 use glam::{DVec3, Quat, Vec3};
 use load_common::Document;
+use proptest::prelude::*;
 use serde_json::{Value, json};
 
 fn read(json: &Value) -> CameraPath {
@@ -290,6 +291,43 @@ fn a_request_names_a_path_or_a_file() {
     // A scene of a known name and another size is not the known one.
     let named = Scene { name: "sponza".to_owned(), ..far };
     assert_eq!(CameraPath::names(&named), ["fly-through"]);
+}
+
+proptest! {
+    /// Whatever a file holds, it is a path that gives finite cameras, or one line.
+    #[test]
+    fn damaged_files_end_in_a_path_or_an_error(
+        cuts in prop::collection::vec((0usize..400, any::<u8>()), 0..4),
+        numbers in prop::collection::vec(prop::sample::select(vec!["0", "-1", "1e300", "1e-300", "null", "[]", "5", "true"]), 3),
+        closed: bool, has_times: bool, turned: bool,
+    ) {
+        let keyframes: Vec<Value> = (0..3).map(|k| {
+            let mut key = json!({"eye_ws": [k, 2, 3], "fov_deg": 50, "cut": k == 1});
+            if turned { key["rotation"] = json!([0, k - 1, 0, 1]) } else { key["target_ws"] = json!([0, 0, -7]) }
+            if has_times { key["time_s"] = json!(k * k) }
+            key
+        }).collect();
+        let mut text = json!({"name": "p", "closed": closed, "near_m": 0.5, "keyframes": keyframes}).to_string();
+        for (k, number) in numbers.iter().enumerate() {
+            let digits: Vec<usize> = text.char_indices().filter(|(_, c)| c.is_ascii_digit()).map(|(at, _)| at).collect();
+            let at = digits[(k * 7 + text.len()) % digits.len()];
+            text.replace_range(at..=at, number);
+        }
+        for (at, byte) in cuts {
+            let at = at % text.len();
+            text.replace_range(at..=at, &char::from(byte % 128).to_string());
+        }
+        match CameraPath::from_json(&text, Path::new("p.json")) {
+            Ok(path) => {
+                for time_s in [-1.0, 0.0, 0.3, 1.0, 2.5, 1e12, f64::NAN, f64::NEG_INFINITY] {
+                    let camera = path.camera_at(time_s);
+                    prop_assert!(camera.world_from_view.matrix3.is_finite(), "{text} at {time_s}");
+                    path.shot_at(time_s);
+                }
+            }
+            Err(error) => prop_assert!(!error.to_string().contains('\n'), "{error}"),
+        }
+    }
 }
 
 /// Distance of a point to a triangle (Ericson 2005, 5.1.5), metres.
