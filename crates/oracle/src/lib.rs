@@ -5,6 +5,7 @@
 
 pub mod brdf;
 pub mod clusters;
+pub mod deform;
 pub mod furnace;
 pub mod packing;
 pub mod raster;

@@ -1,4 +1,6 @@
-//! Animation of nodes: translation, rotation and scale over time.
+//! Animation: translation, rotation and scale of nodes, and weights of morph targets, over time.
+//!
+//! Files have 32 bits; values between keys are found in 64 ([`NodeTrack::local_at`], [`WeightTrack::weights_at`]).
 
 use glam::{Affine3A, DAffine3, DQuat, DVec3, Quat, Vec3};
 
@@ -46,15 +48,29 @@ pub struct NodeTrack {
     pub scale: Option<Curve<Vec3>>,
 }
 
+/// The weights of the morph targets of one node's mesh over time (glTF 2.0, 3.11).
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct WeightTrack {
+    /// Index into [`Scene::nodes`] of the node whose mesh is morphed.
+    pub node: u32,
+    /// Number of morph targets.
+    pub target_count: u32,
+    /// Times of the keys in seconds, and for each key a weight of each target, one key after another; for
+    /// [`Interpolation::CubicSpline`] in-tangents of all targets, then their weights, then their out-tangents.
+    pub curve: Curve<f32>,
+}
+
 /// An animation: motions of several nodes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Animation {
-    /// Name for messages.
+    /// Name, as the file has it.
     pub name: String,
     /// Time of the last key, seconds; times beyond wrap around.
     pub duration_s: f64,
     /// Motions, at most one a node.
     pub tracks: Vec<NodeTrack>,
+    /// Changes of shape, at most one a node.
+    pub weights: Vec<WeightTrack>,
 }
 
 /// A value that a curve can have.
@@ -69,9 +85,23 @@ pub trait Animated: Copy {
 }
 
 /// Weights of start value, start tangent, end tangent, end value (glTF 2.0, C.5).
-fn hermite_weights(t: f32) -> [f32; 4] {
+fn hermite_weights(t: f64) -> [f64; 4] {
     let (t2, t3) = (t * t, t * t * t);
     [2.0 * t3 - 3.0 * t2 + 1.0, t3 - 2.0 * t2 + t, t3 - t2, 3.0 * t2 - 2.0 * t3]
+}
+
+/// The shorter way between two rotations at an even speed (glTF 2.0, C.4).
+pub(crate) fn slerp(a: DQuat, b: DQuat, t: f64) -> DQuat {
+    let (a, b) = (unit(a), unit(b));
+    let b = if a.dot(b) < 0.0 { -b } else { b };
+    // The sine of the angle between them, which a dot product near 1 does not tell.
+    let angle = 2.0 * (0.5 * (b - a).length()).min(1.0).asin();
+    let sine = angle.sin();
+    // Nearly one rotation: the chord is the arc, and the quotient has no digits.
+    if sine < 1e-6 {
+        return unit(a * (1.0 - t) + b * t);
+    }
+    unit(a * (((1.0 - t) * angle).sin() / sine) + b * ((t * angle).sin() / sine))
 }
 
 impl Animated for Vec3 {
@@ -80,7 +110,7 @@ impl Animated for Vec3 {
     }
 
     fn hermite(a: Self, out_a: Self, in_b: Self, b: Self, t: f32) -> Self {
-        let w = hermite_weights(t);
+        let w = hermite_weights(f64::from(t)).map(|w| w as f32);
         a * w[0] + out_a * w[1] + in_b * w[2] + b * w[3]
     }
 
@@ -95,7 +125,7 @@ impl Animated for Quat {
     }
 
     fn hermite(a: Self, out_a: Self, in_b: Self, b: Self, t: f32) -> Self {
-        let w = hermite_weights(t);
+        let w = hermite_weights(f64::from(t)).map(|w| w as f32);
         let q = a * w[0] + out_a * w[1] + in_b * w[2] + b * w[3];
         if q.length_squared() > 0.0 { q.normalize() } else { a }
     }
@@ -105,27 +135,74 @@ impl Animated for Quat {
     }
 }
 
+/// Where a time lies among the keys of a curve.
+enum Place {
+    /// The value of this key holds.
+    Key(usize),
+    /// At `t` in [0, 1] between this key and the next, `span_s` seconds apart.
+    After { key: usize, t: f64, span_s: f64 },
+}
+
+impl<T> Curve<T> {
+    /// Where a time lies; `None` without keys.
+    fn place(&self, time_s: f64) -> Option<Place> {
+        let next = self.times_s.partition_point(|&key_s| f64::from(key_s) <= time_s);
+        let key = next.saturating_sub(1);
+        if next == 0 || next == self.times_s.len() || self.interpolation == Interpolation::Step {
+            return (!self.times_s.is_empty()).then_some(Place::Key(key));
+        }
+        let span_s = f64::from(self.times_s[next]) - f64::from(self.times_s[key]);
+        let t = if span_s > 0.0 { (time_s - f64::from(self.times_s[key])) / span_s } else { 0.0 };
+        Some(Place::After { key, t, span_s })
+    }
+
+    /// Whether each key has two tangents beside its value.
+    fn is_cubic(&self) -> bool {
+        self.interpolation == Interpolation::CubicSpline
+    }
+}
+
+impl<T: Copy> Curve<T> {
+    /// The value in 64 bits at a time, of values that `wide` widens: `mix` is the value between two, and a spline's value
+    /// is the sum of its four parts.
+    fn wide_at<W>(&self, time_s: f64, wide: impl Fn(T) -> W, mix: impl Fn(W, W, f64) -> W) -> Option<W>
+    where
+        W: Copy + std::ops::Mul<f64, Output = W> + std::ops::Add<Output = W>,
+    {
+        let value = |k: usize| self.values.get(k).map(|&v| wide(v));
+        let key_value = |k: usize| value(if self.is_cubic() { 3 * k + 1 } else { k });
+        match self.place(time_s)? {
+            Place::Key(key) => key_value(key),
+            Place::After { key, t, .. } if !self.is_cubic() => {
+                Some(mix(key_value(key)?, key_value(key + 1)?, t))
+            }
+            Place::After { key, t, span_s } => {
+                let w = hermite_weights(t);
+                let (a, b) = (key_value(key)?, key_value(key + 1)?);
+                let (out_a, in_b) = (value(3 * key + 2)?, value(3 * key + 3)?);
+                Some(a * w[0] + out_a * (w[1] * span_s) + in_b * (w[2] * span_s) + b * w[3])
+            }
+        }
+    }
+}
+
 impl<T: Animated> Curve<T> {
     /// The value at a time; `None` where the curve has no key or fewer values than its keys need.
     pub fn at(&self, time_s: f32) -> Option<T> {
-        let cubic = self.interpolation == Interpolation::CubicSpline;
-        let key = |k: usize| self.values.get(if cubic { 3 * k + 1 } else { k }).copied();
-        let next = self.times_s.partition_point(|&t| t <= time_s);
-        if next == 0 {
-            return key(0);
+        let value = |k: usize| self.values.get(k).copied();
+        let key_value = |k: usize| value(if self.is_cubic() { 3 * k + 1 } else { k });
+        match self.place(f64::from(time_s))? {
+            Place::Key(key) => key_value(key),
+            Place::After { key, t, .. } if !self.is_cubic() => {
+                Some(T::mix(key_value(key)?, key_value(key + 1)?, t as f32))
+            }
+            Place::After { key, t, span_s } => {
+                let (a, b) = (key_value(key)?, key_value(key + 1)?);
+                let (out_a, in_b) = (value(3 * key + 2)?, value(3 * key + 3)?);
+                let [out_a, in_b] = [out_a, in_b].map(|tangent| T::scaled(tangent, span_s as f32));
+                Some(T::hermite(a, out_a, in_b, b, t as f32))
+            }
         }
-        let last = next - 1;
-        if next == self.times_s.len() || self.interpolation == Interpolation::Step {
-            return key(last);
-        }
-        let span_s = self.times_s[next] - self.times_s[last];
-        let t = if span_s > 0.0 { (time_s - self.times_s[last]) / span_s } else { 0.0 };
-        let (a, b) = (key(last)?, key(next)?);
-        if !cubic {
-            return Some(T::mix(a, b, t));
-        }
-        let (out_a, in_b) = (*self.values.get(3 * last + 2)?, *self.values.get(3 * next)?);
-        Some(T::hermite(a, T::scaled(out_a, span_s), T::scaled(in_b, span_s), b, t))
     }
 }
 
@@ -146,11 +223,46 @@ impl Default for NodeTrack {
 impl NodeTrack {
     /// Parent from node at a time.
     pub fn local_at(&self, time_s: f32) -> DAffine3 {
-        let translation = self.translation.as_ref().and_then(|c| c.at(time_s));
-        let translation = translation.map_or(self.rest_translation, |t| t.as_dvec3());
-        let rotation = self.rotation.as_ref().and_then(|c| c.at(time_s)).unwrap_or(self.rest_rotation);
-        let scale = self.scale.as_ref().and_then(|c| c.at(time_s)).unwrap_or(self.rest_scale);
-        local(scale.as_dvec3(), rotation.as_dquat(), translation)
+        let time_s = f64::from(time_s);
+        let vector = |curve: &Option<Curve<Vec3>>| {
+            curve.as_ref().and_then(|c| c.wide_at(time_s, |v| v.as_dvec3(), |a, b, t| a.lerp(b, t)))
+        };
+        let rotation = self.rotation.as_ref().and_then(|c| c.wide_at(time_s, |q| q.as_dquat(), slerp));
+        local(
+            vector(&self.scale).unwrap_or(self.rest_scale.as_dvec3()),
+            rotation.unwrap_or(self.rest_rotation.as_dquat()),
+            vector(&self.translation).unwrap_or(self.rest_translation),
+        )
+    }
+}
+
+impl WeightTrack {
+    /// Writes the weights at a time into `weights`, one a target; what the curve does not have stays.
+    pub fn weights_at(&self, time_s: f32, weights: &mut [f32]) {
+        let Some(place) = self.curve.place(f64::from(time_s)) else { return };
+        let count = self.target_count as usize;
+        // Rows of the values: a key has one, or three where it has tangents.
+        let value = |row: usize, target: usize| {
+            self.curve.values.get(row * count + target).map(|&weight| f64::from(weight))
+        };
+        let key_row = |key: usize| if self.curve.is_cubic() { 3 * key + 1 } else { key };
+        let at = |target: usize| -> Option<f64> {
+            match place {
+                Place::Key(key) => value(key_row(key), target),
+                Place::After { key, t, span_s } => {
+                    let (a, b) = (value(key_row(key), target)?, value(key_row(key + 1), target)?);
+                    if !self.curve.is_cubic() {
+                        return Some(a + (b - a) * t);
+                    }
+                    let w = hermite_weights(t);
+                    let (out_a, in_b) = (value(3 * key + 2, target)?, value(3 * key + 3, target)?);
+                    Some(a * w[0] + out_a * (w[1] * span_s) + in_b * (w[2] * span_s) + b * w[3])
+                }
+            }
+        };
+        for (target, weight) in weights.iter_mut().enumerate().take(count) {
+            *weight = at(target).map_or(*weight, |found| found as f32);
+        }
     }
 }
 
@@ -178,38 +290,40 @@ impl Animation {
 impl Scene {
     /// World from node for every node: at rest, or as the first animation has it at a time.
     pub fn world_from_nodes(&self, time_s: Option<f64>) -> Vec<Affine3A> {
-        let relative = |m: DAffine3| DAffine3 { translation: m.translation - self.origin_file, ..m };
-        self.file_from_nodes(time_s).into_iter().map(|m| relative(m).as_affine3a()).collect()
+        let nodes = self.file_from_nodes(time_s);
+        nodes.into_iter().map(|file_from_node| self.world_from(file_from_node)).collect()
+    }
+
+    /// World from a space, given the file's space from it.
+    pub(crate) fn world_from(&self, mut file_from_space: DAffine3) -> Affine3A {
+        file_from_space.translation -= self.origin_file;
+        file_from_space.as_affine3a()
     }
 
     /// The file's space from node for every node, as [`Self::world_from_nodes`].
     pub(crate) fn file_from_nodes(&self, time_s: Option<f64>) -> Vec<DAffine3> {
-        let mut locals: Vec<_> = self.nodes.iter().map(|n| n.local).collect();
-        if let (Some(time_s), Some(animation)) = (time_s, self.animations.first()) {
-            let time_s = animation.wrap(time_s);
+        let mut nodes = Vec::with_capacity(self.nodes.len());
+        let playing = time_s.and_then(|time_s| self.animations.first().map(|a| (a, a.wrap(time_s))));
+        self.file_from_nodes_into(playing, &mut nodes);
+        nodes
+    }
+
+    /// The file's space from node for every node, at rest or as an animation has them at a time within it.
+    pub(crate) fn file_from_nodes_into(&self, playing: Option<(&Animation, f32)>, nodes: &mut Vec<DAffine3>) {
+        nodes.clear();
+        nodes.extend(self.nodes.iter().map(|n| n.local));
+        if let Some((animation, time_s)) = playing {
             for track in &animation.tracks {
-                if let Some(local) = locals.get_mut(track.node as usize) {
+                if let Some(local) = nodes.get_mut(track.node as usize) {
                     *local = track.local_at(time_s);
                 }
             }
         }
-        let mut worlds: Vec<DAffine3> = Vec::with_capacity(locals.len());
-        for (node, local) in self.nodes.iter().zip(locals) {
-            let world = node.parent.map_or(local, |p| worlds[p as usize] * local);
-            worlds.push(world);
-        }
-        worlds
-    }
-
-    /// Places the instances as the first animation has them at a time; without an animation
-    /// nothing changes. Lights and cameras stay: ask for a time on loading to move them too.
-    pub fn pose(&mut self, time_s: f64) {
-        if self.animations.is_empty() {
-            return;
-        }
-        let worlds = self.world_from_nodes(Some(time_s));
-        for instance in &mut self.instances {
-            instance.world_from_object = worlds[instance.node as usize];
+        // Parents come first, so that theirs are done.
+        for (k, node) in self.nodes.iter().enumerate() {
+            if let Some(parent) = node.parent.and_then(|p| nodes.get(p as usize)).copied() {
+                nodes[k] = parent * nodes[k];
+            }
         }
     }
 }

@@ -1,22 +1,22 @@
-//! Choice of a camera, a camera made to fit, and camera paths.
+//! Choice of a camera, and a camera made to fit.
 
-use std::{cmp::Ordering, path::Path};
+use std::cmp::Ordering;
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
+pub use crate::path::{CameraPath, Keyframe};
 use crate::{Aabb, Camera, Instance, Projection, Scene, SceneError};
 
 /// Near plane of a camera given by numbers, and the farthest of one made to fit, metres.
-const NEAR_MAX_M: f32 = 0.1;
+pub(crate) const NEAR_MAX_M: f32 = 0.1;
 /// Extent of a scene over the near plane of a camera made to fit. Depth is reversed and in floating
 /// point, so the ratio costs no precision; a greater near plane would cut what stands before the eye.
 const EXTENT_PER_NEAR: f32 = 10_000.0;
 /// Vertical angle of view of a camera inside a scene, degrees.
-const INTERIOR_FOV_DEG: f32 = 60.0;
+pub(crate) const INTERIOR_FOV_DEG: f32 = 60.0;
 /// Vertical angle of view of a camera before a scene, degrees.
-const EXTERIOR_FOV_DEG: f32 = 45.0;
+pub(crate) const EXTERIOR_FOV_DEG: f32 = 45.0;
 /// Height of a standing person's eye, metres.
 const EYE_HEIGHT_M: f32 = 1.7;
 /// Most triangles looked at to tell an interior from an object.
@@ -267,152 +267,6 @@ fn hit_triangle([a, b, c]: [Vec3; 3], origin: Vec3, direction: Vec3) -> f32 {
     if u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 0.0 { t } else { f32::INFINITY }
 }
 
-/// A place on a camera path.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Keyframe {
-    /// Position of the eye in the file's coordinates, metres.
-    pub eye_ws: [f64; 3],
-    /// Point that is looked at in the file's coordinates, metres.
-    pub target_ws: [f64; 3],
-    /// Vertical angle of view, degrees, between 0 and 180.
-    pub fov_deg: f32,
-}
-
-/// A camera path: a Catmull-Rom spline through keyframes at even times.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct CameraPath {
-    /// Name for reports.
-    pub name: String,
-    /// Near plane, metres.
-    #[serde(default = "default_near_m")]
-    pub near_m: f32,
-    /// Whether the path returns from the last keyframe to the first.
-    #[serde(default)]
-    pub closed: bool,
-    /// The keyframes, at least one.
-    pub keyframes: Vec<Keyframe>,
-    /// [`Scene::origin_file`] of the scene that the path leads through: what cameras of the path are relative to.
-    #[serde(skip)]
-    pub origin_file: DVec3,
-}
-
-fn default_near_m() -> f32 {
-    NEAR_MAX_M
-}
-
-impl CameraPath {
-    /// Reads a path from a JSON file.
-    ///
-    /// # Errors
-    /// [`SceneError::Io`] where the file cannot be read, [`SceneError::Invalid`] where it is no path.
-    pub fn load(file: &Path) -> Result<Self, SceneError> {
-        let text = std::fs::read_to_string(file).map_err(|e| SceneError::io(file, &e))?;
-        Self::from_json(&text, file)
-    }
-
-    /// Reads a path from JSON; `file` is named in errors.
-    ///
-    /// # Errors
-    /// [`SceneError::Invalid`] where the text is no path.
-    pub fn from_json(text: &str, file: &Path) -> Result<Self, SceneError> {
-        let path: Self = serde_json::from_str(text).map_err(|e| {
-            SceneError::invalid(
-                file,
-                "camera path",
-                e.to_string(),
-                "keyframes with eye_ws, target_ws, fov_deg",
-            )
-        })?;
-        path.check(file)?;
-        Ok(path)
-    }
-
-    fn check(&self, file: &Path) -> Result<(), SceneError> {
-        if self.keyframes.is_empty() {
-            return Err(SceneError::invalid(file, "keyframes", "none", "at least one"));
-        }
-        if !(self.near_m > 0.0 && self.near_m.is_finite()) {
-            return Err(SceneError::invalid(file, "near_m", self.near_m.to_string(), "a positive number"));
-        }
-        for (i, k) in self.keyframes.iter().enumerate() {
-            if !(k.fov_deg > 0.0 && k.fov_deg < 180.0) {
-                let at = format!("keyframes[{i}].fov_deg");
-                return Err(SceneError::invalid(
-                    file,
-                    at,
-                    k.fov_deg.to_string(),
-                    "degrees between 0 and 180",
-                ));
-            }
-            // Cameras have 32 bits.
-            if !k.eye_ws.iter().chain(&k.target_ws).all(|v| (*v as f32).is_finite()) {
-                return Err(SceneError::invalid(
-                    file,
-                    format!("keyframes[{i}]"),
-                    "a number out of range",
-                    "finite numbers",
-                ));
-            }
-        }
-        Ok(())
-    }
-
-    /// A fly-through of any scene, from its bounds alone: for an interior there and back along its
-    /// longest axis at changing heights, else around its bounding sphere.
-    pub fn fly_through(scene: &Scene) -> Self {
-        let camera = default_camera(scene);
-        let near_m = camera.clip_near_m();
-        let bounds_ws = scene.bounds_ws();
-        let (center_ws, size_m) = (bounds_ws.center(), bounds_ws.size());
-        let sound = center_ws.is_finite() && size_m.is_finite() && size_m.max_element() > 0.0;
-        let eye_ws = camera.eye_ws();
-        let inside = sound && eye_ws.cmpge(bounds_ws.min).all() && eye_ws.cmple(bounds_ws.max).all();
-        let mut keyframes = if inside { walk(&bounds_ws, eye_ws) } else { orbit(center_ws, eye_ws) };
-        for point in keyframes.iter_mut().flat_map(|k| [&mut k.eye_ws, &mut k.target_ws]) {
-            *point = (scene.origin_file + DVec3::from_array(*point)).to_array();
-        }
-        let name = "fly-through".to_owned();
-        Self { name, near_m, closed: true, keyframes, origin_file: scene.origin_file }
-    }
-
-    /// The path through a scene: its cameras are relative to the scene's origin.
-    pub fn through(self, scene: &Scene) -> Self {
-        Self { origin_file: scene.origin_file, ..self }
-    }
-
-    /// The camera at `t` in [0, 1], clamped: 0 is the first keyframe, 1 the last (the first again where closed).
-    pub fn at(&self, t: f32) -> Camera {
-        let count = self.keyframes.len();
-        let t = if t.is_finite() { t.clamp(0.0, 1.0) } else { 0.0 };
-        if count == 0 {
-            return Camera::look_at(
-                &self.name,
-                Vec3::ZERO,
-                Vec3::NEG_Z,
-                EXTERIOR_FOV_DEG.to_radians(),
-                self.near_m,
-            );
-        }
-        let spans = if self.closed { count } else { count - 1 };
-        let place = t * spans as f32;
-        let span = (place as usize).min(spans.saturating_sub(1));
-        let at = |offset: isize| {
-            let i = span as isize + offset;
-            let i = if self.closed { i.rem_euclid(count as isize) } else { i.clamp(0, count as isize - 1) };
-            &self.keyframes[i as usize]
-        };
-        let keys = [at(-1), at(0), at(1), at(2)];
-        let u = place - span as f32;
-        let relative = |point: [f64; 3]| DVec3::from_array(point) - self.origin_file;
-        let eye_ws = catmull_rom(keys.map(|k| relative(k.eye_ws)), u);
-        let target_ws = catmull_rom(keys.map(|k| relative(k.target_ws)), u);
-        let fov_deg = keys[1].fov_deg + (keys[2].fov_deg - keys[1].fov_deg) * u;
-        Camera::look_at(&self.name, eye_ws, target_ws, fov_deg.to_radians(), self.near_m)
-    }
-}
-
 impl Camera {
     /// Distance of the near plane, metres.
     pub fn clip_near_m(&self) -> f32 {
@@ -420,51 +274,4 @@ impl Camera {
             Projection::Perspective { near_m, .. } | Projection::Orthographic { near_m, .. } => near_m,
         }
     }
-}
-
-/// There and back between the eye and its mirror image at the centre, within the middle of the cross-section.
-fn walk(bounds_ws: &Aabb, eye_ws: Vec3) -> Vec<Keyframe> {
-    let center_ws = bounds_ws.center();
-    let along_ws = Vec3::new(center_ws.x - eye_ws.x, 0.0, center_ws.z - eye_ws.z);
-    let side_ws = along_ws.cross(Vec3::Y).normalize_or_zero() * 0.08 * bounds_ws.size().min_element();
-    let rise_ws = Vec3::Y * (0.25 * bounds_ws.size().y).min(0.5 * (bounds_ws.max.y - eye_ws.y).max(0.0));
-    let place = |a: f32, side: f32, rise: f32| eye_ws + along_ws * a + side_ws * side + rise_ws * rise;
-    let key = |eye: Vec3, target: Vec3| Keyframe {
-        eye_ws: eye.as_dvec3().into(),
-        target_ws: target.as_dvec3().into(),
-        fov_deg: INTERIOR_FOV_DEG,
-    };
-    vec![
-        key(place(0.1, 0.0, 0.0), place(1.1, 0.0, 0.1)),
-        key(place(0.7, 1.0, 0.2), place(1.6, -1.0, 0.3)),
-        key(place(1.3, 0.0, 0.6), place(1.9, 3.0, 0.5)),
-        key(place(1.7, -1.0, 0.8), place(1.4, -4.0, 0.4)),
-        key(place(1.3, 0.0, 0.9), place(0.5, 0.0, 0.5)),
-        key(place(0.7, 1.0, 0.4), place(0.0, 1.0, 0.2)),
-    ]
-}
-
-/// Around the centre at the eye's distance and height.
-fn orbit(center_ws: Vec3, eye_ws: Vec3) -> Vec<Keyframe> {
-    let arm = eye_ws - center_ws;
-    (0..8u8)
-        .map(|i| {
-            let turned = glam::Quat::from_rotation_y(f32::from(i) * std::f32::consts::FRAC_PI_4) * arm;
-            Keyframe {
-                eye_ws: (center_ws + turned).as_dvec3().into(),
-                target_ws: center_ws.as_dvec3().into(),
-                fov_deg: EXTERIOR_FOV_DEG,
-            }
-        })
-        .collect()
-}
-
-/// The uniform Catmull-Rom spline between the middle two of four points (Catmull, Rom 1974).
-fn catmull_rom([p0, p1, p2, p3]: [DVec3; 4], u: f32) -> Vec3 {
-    let u = f64::from(u);
-    let sum: DVec3 = 2.0 * p1
-        + (p2 - p0) * u
-        + (2.0 * p0 - 5.0 * p1 + 4.0 * p2 - p3) * (u * u)
-        + (3.0 * (p1 - p2) + p3 - p0) * (u * u * u);
-    (0.5 * sum).as_vec3()
 }

@@ -7,6 +7,7 @@
 pub mod animation;
 pub mod builtin;
 pub mod camera;
+mod deform;
 mod error;
 mod gltf;
 pub mod lights;
@@ -15,11 +16,17 @@ mod model;
 mod mtl;
 mod obj;
 mod origin;
+mod path;
 pub mod points;
+mod pose;
 pub mod rng;
 mod tangent;
 pub mod texture;
 
+pub use deform::{
+    Deformation, Influences, JOINTS_PER_SET, JOINTS_PER_VERTEX_MAX, JointBounds, MorphTarget, Shape, Skin,
+};
 pub use error::SceneError;
 pub use load::{LoadOptions, load, load_bytes, load_source};
 pub use model::*;
+pub use pose::{Attachment, Moment, Pose};

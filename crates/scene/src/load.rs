@@ -11,8 +11,8 @@ use crate::{Scene, SceneError};
 /// How a scene is loaded.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LoadOptions {
-    /// Time at which animated nodes are posed, seconds, wrapped at the animation's duration;
-    /// `None` is the rest pose.
+    /// Time at which the first animation is shown, seconds, wrapped at its duration: nodes, skins, morph targets, cameras and
+    /// lights; `None` is the rest pose.
     pub time_s: Option<f64>,
 }
 

@@ -315,8 +315,20 @@ pub struct Scene {
     pub cameras: Vec<Camera>,
     /// What surrounds it.
     pub environment: Environment,
-    /// Animations of nodes.
+    /// Animations. The first is played where none is named.
     pub animations: Vec<crate::animation::Animation>,
+    /// Skins of what is drawn.
+    pub skins: Vec<crate::Skin>,
+    /// Vertices of deformed meshes as they are before any deformation.
+    pub shapes: Vec<crate::Shape>,
+    /// What deforms meshes, by rising mesh; none for meshes whose vertices stay. [`Scene::deformation_of`] finds an instance's.
+    pub deformations: Vec<crate::Deformation>,
+    /// Weights of the morph targets of all deformations at rest, in the order of [`Pose::weights`](crate::Pose::weights).
+    pub rest_weights: Vec<f32>,
+    /// Cameras that hang on nodes; none where nothing is animated.
+    pub camera_nodes: Vec<crate::Attachment>,
+    /// Lights that hang on nodes; none where nothing is animated. Who puts other lights into the scene clears it.
+    pub light_nodes: Vec<crate::Attachment>,
     /// What was tolerated, a line each.
     pub warnings: Vec<String>,
 }
@@ -372,6 +384,12 @@ impl Material {
             &self.emissive_texture,
         ];
         all.into_iter().flatten()
+    }
+}
+
+impl Default for Aabb {
+    fn default() -> Self {
+        Self::EMPTY
     }
 }
 
@@ -559,11 +577,10 @@ impl VertexAttributes {
         uv1: Vec2,
         color: [f32; 4],
     ) -> Self {
-        let sign_bit = u32::from(handedness < 0.0) << 16;
-        let tangent = tangent::tangent_beside(normal_os, tangent_os).map_or(NO_TANGENT, oct_encode);
+        let [normal_os_oct, tangent_os_oct] = Self::pack_frame(normal_os, tangent_os, handedness);
         Self {
-            normal_os_oct: oct_encode(normal_os),
-            tangent_os_oct: (tangent & !(1 << 16)) | sign_bit,
+            normal_os_oct,
+            tangent_os_oct,
             uv0: [uv0.x.to_bits(), uv0.y.to_bits()],
             uv1: [uv1.x.to_bits(), uv1.y.to_bits()],
             color_rgba8: color
@@ -571,6 +588,13 @@ impl VertexAttributes {
                 .enumerate()
                 .fold(0, |c, (i, v)| c | ((v.clamp(0.0, 1.0) * 255.0 + 0.5) as u32) << (8 * i)),
         }
+    }
+
+    /// [`Self::normal_os_oct`] and [`Self::tangent_os_oct`], as [`Self::pack`] makes them.
+    pub(crate) fn pack_frame(normal_os: Vec3, tangent_os: Vec3, handedness: f32) -> [u32; 2] {
+        let sign_bit = u32::from(handedness < 0.0) << 16;
+        let tangent = tangent::tangent_beside(normal_os, tangent_os).map_or(NO_TANGENT, oct_encode);
+        [oct_encode(normal_os), (tangent & !(1 << 16)) | sign_bit]
     }
 
     /// The unit normal in object space.

@@ -83,6 +83,10 @@ impl Scene {
                     self.nodes.len() as u32 - 1
                 });
                 self.instances[k].node = node;
+                // Vertices of a skin are written relative to that node from now on; those of a shape alone have moved with the mesh.
+                if let Some(d) = self.deformation_of(k) {
+                    self.deformations[d].object_node = node;
+                }
             }
         }
         self.origin_file += delta;
@@ -120,6 +124,11 @@ impl Scene {
             (bounds.min, bounds.max) =
                 ((bounds.min.as_dvec3() - *shift).as_vec3(), (bounds.max.as_dvec3() - *shift).as_vec3());
             shifts.insert(m as u32, *shift);
+        }
+        for d in self.deformations.iter().filter(|d| d.skin.is_none()) {
+            if let Some((shift, shape)) = shifts.get(&d.mesh).zip(self.shapes.get_mut(d.shape as usize)) {
+                shape.shift(*shift);
+            }
         }
         shifts
     }

@@ -262,7 +262,7 @@ fn camera_paths_pass_through_their_keyframes() {
         {"eye_ws": [1, 2, 0], "target_ws": [0, 0, -1], "fov_deg": 60},
         {"eye_ws": [3, 0, 1], "target_ws": [0, 0, -1], "fov_deg": 50}]}"#;
     let path = camera::CameraPath::from_json(text, file).expect("a path");
-    for (i, key) in path.keyframes.iter().enumerate() {
+    for (i, key) in path.keyframes().iter().enumerate() {
         let camera = path.at(i as f32 / 2.0);
         assert!(camera.eye_ws().abs_diff_eq(glam::DVec3::from_array(key.eye_ws).as_vec3(), 1e-5));
     }

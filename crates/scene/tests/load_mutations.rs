@@ -6,7 +6,7 @@ mod load_common;
 use std::{io::Cursor, path::Path};
 
 use afterlight_scene::{
-    Image, ImageData, LoadOptions, load_bytes,
+    Image, ImageData, LoadOptions, Moment, Scene, load_bytes,
     texture::{TextureRole, decode},
 };
 use image::{DynamicImage, ImageFormat, ImageReader};
@@ -93,11 +93,41 @@ fn mutate(bytes: &mut Vec<u8>, random: &mut Random) {
     }
 }
 
+/// Poses a scene at several times: whatever its animations hold, nothing panics, and boxes hold what is drawn.
+fn play(file: &Path, scene: &mut Scene) {
+    if scene.deformations.is_empty() && scene.animations.is_empty() {
+        return;
+    }
+    let mut pose = scene.pose_at(0.0);
+    for (animation, time_s) in [(0, 0.7), (0, 1e9), (1, 0.3)] {
+        scene.pose_into(Moment::Playing { animation, time_s }, &mut pose);
+        scene.take_pose(&pose);
+        scene.moving_instances(animation);
+        for (k, instance) in scene.instances.iter().enumerate().take(64) {
+            let bounds = scene.bounds_in_pose(&pose, k);
+            let mesh = &scene.meshes[instance.mesh as usize];
+            let range = mesh.first_vertex as usize..(mesh.first_vertex + mesh.vertex_count) as usize;
+            let slack = 1e-4 * (bounds.size().max_element() + bounds.center().abs().max_element());
+            for p in scene.positions_os[range].iter().take(1024) {
+                let p = instance.world_from_object.transform_point3((*p).into());
+                let is_held = p.cmpge(bounds.min - slack).all() && p.cmple(bounds.max + slack).all();
+                // Numbers near the end of what 32 bits hold overflow in the box before they do in a vertex.
+                assert!(
+                    is_held || !(p.is_finite() && slack.is_finite()),
+                    "{}: {p} {bounds:?}",
+                    file.display()
+                );
+            }
+        }
+    }
+}
+
 fn try_load(file: &Path, bytes: &[u8]) {
     let options = LoadOptions { time_s: Some(0.25) };
     match load_bytes(file, bytes, &options) {
-        Ok(scene) => {
+        Ok(mut scene) => {
             check_scene(&scene).unwrap_or_else(|e| panic!("{}: {e}", file.display()));
+            play(file, &mut scene);
             for image in scene.images.iter().filter(|i| i.width * i.height <= 1 << 16) {
                 let _ = decode(image, TextureRole::Normal, Some((5, 3)));
             }

@@ -48,7 +48,10 @@ const TOLERATED: &[(&str, &str)] = &[
     ("ROTATION_NON_UNIT", "rotations are made unit"),
     ("ANIMATION_SAMPLER_OUTPUT_NON_NORMALIZED_QUATERNION", "rotations are made unit"),
     ("ACCESSOR_ANIMATION_SAMPLER_OUTPUT_NON_NORMALIZED_QUATERNION", "rotations are made unit"),
-    ("ANIMATION_CHANNEL_TARGET_NODE_WEIGHTS_NO_MORPHS", "morph weights are not animated"),
+    (
+        "ANIMATION_CHANNEL_TARGET_NODE_WEIGHTS_NO_MORPHS",
+        "weights of what has no targets are left out, with a warning",
+    ),
     ("BUFFER_VIEW_TOO_BIG_BYTE_STRIDE", "every element that is read is checked to be in range"),
     ("BUFFER_VIEW_INVALID_BYTE_STRIDE", "the stride is used as it is, in range"),
     ("MESH_PRIMITIVE_ACCESSOR_WITHOUT_BYTESTRIDE", "elements that lie close together are read as such"),
@@ -69,7 +72,7 @@ const TOLERATED: &[(&str, &str)] = &[
     ("NODE_SKIN_WITH_NON_SKINNED_MESH", "a mesh without joints is drawn without the skin"),
     ("SKIN_NO_COMMON_ROOT", "each joint's own place is used"),
     ("SKIN_SKELETON_INVALID", "the skeleton's root is a hint, not used"),
-    ("ACCESSOR_INVALID_IBM", "the last row of a bind matrix is used as it is"),
+    ("ACCESSOR_INVALID_IBM", "the last row of a bind matrix is taken as 0, 0, 0, 1, with a warning"),
 ];
 
 /// Files that are judged otherwise than the validator does, and why.

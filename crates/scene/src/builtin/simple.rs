@@ -334,6 +334,7 @@ pub(super) fn moving(segments: u32) -> Scene {
             NodeTrack { scale: Some(pulse()), ..track(scaler, Vec3::new(3.0, -0.2, -1.0), Vec3::ONE) },
             NodeTrack { rotation: Some(spin(Vec3::X)), ..track(swinger, Vec3::X * 1.7, Vec3::splat(0.4)) },
         ],
+        weights: Vec::new(),
     }];
     b.scene.lights = vec![
         sun(Vec3::new(-0.4, -1.0, -0.5), Vec3::splat(2.0)),

@@ -1,8 +1,10 @@
 //! Primitives to packed vertices and triangle lists.
 
+mod shape;
+
 use std::collections::HashMap;
 
-use glam::{Mat3, Mat4, Vec2, Vec3, Vec4};
+use glam::{Vec2, Vec3, Vec4};
 use gltf::json::{
     Root,
     mesh::{Mode, Primitive, Semantic},
@@ -27,10 +29,21 @@ const COUNT_PER_BYTE: u64 = 4;
 pub(super) struct Variant {
     /// Index of the glTF mesh.
     pub(super) mesh: usize,
-    /// Weights of its morph targets; empty for none.
+    /// Weights of its morph targets at rest, one a target.
     pub(super) weights: Vec<f32>,
-    /// World from bind space for each joint of its skin; empty for none.
-    pub(super) joints: Vec<Mat4>,
+    /// Index into [`Scene::skins`].
+    pub(super) skin: Option<u32>,
+    /// The scene's node that has the mesh, and with it the weights.
+    pub(super) node: u32,
+    /// The scene's node in whose space the vertices are.
+    pub(super) object_node: u32,
+}
+
+impl Variant {
+    /// Whether its vertices are made from a shape.
+    fn is_deformed(&self) -> bool {
+        self.skin.is_some() || !self.weights.is_empty()
+    }
 }
 
 /// Accessors that make up a vertex stream, those of the attributes that are kept.
@@ -55,9 +68,24 @@ struct Job<'a> {
     streams: Streams,
     /// Place among the shared vertex streams; `None` where the vertices are its own.
     shared: Option<usize>,
+    /// Place among the shapes to build; `None` where nothing deforms the vertices.
+    shape: Option<usize>,
+}
+
+/// What the primitives of a file need, before anything is built.
+#[derive(Default)]
+struct Plan<'a> {
+    jobs: Vec<Job<'a>>,
+    /// For each variant the number of its jobs.
+    counts: Vec<u32>,
+    /// Vertex streams that primitives share.
+    streams: Vec<Streams>,
+    /// For each shape the first job that is made from it.
+    shapes: Vec<usize>,
 }
 
 /// Packed vertices.
+#[derive(Clone)]
 struct Vertices {
     positions_os: Vec<[f32; 3]>,
     attributes: Vec<VertexAttributes>,
@@ -79,19 +107,30 @@ pub(super) fn convert(
     variants: &[Variant],
     scene: &mut Scene,
 ) -> Result<Vec<std::ops::Range<u32>>, SceneError> {
-    let mut shared_streams = Vec::new();
-    let (jobs, counts) = plan(root, variants, scene, &mut shared_streams);
-    check_size(accessors, &jobs, &shared_streams)?;
+    let plan = plan(root, variants, scene);
+    check_size(accessors, &plan)?;
 
     let shared: Vec<Vertices> =
-        shared_streams.par_iter().map(|s| shared_vertices(accessors, s)).collect::<Result<_, _>>()?;
+        plan.streams.par_iter().map(|s| shared_vertices(accessors, s)).collect::<Result<_, _>>()?;
+    let mut shapes = plan
+        .shapes
+        .par_iter()
+        .map(|&job| shape::build(accessors, &plan.jobs[job]))
+        .collect::<Result<Vec<_>, _>>()?;
     let mut bases = Vec::with_capacity(shared.len());
     for vertices in shared {
         bases.push(append(scene, vertices));
     }
     let built: Vec<(Option<Vertices>, Vec<u32>, bool)> =
-        jobs.par_iter().map(|job| build(accessors, job)).collect::<Result<_, _>>()?;
-    for (job, (vertices, indices, leftover)) in jobs.iter().zip(built) {
+        plan.jobs.par_iter().map(|job| build(accessors, job)).collect::<Result<_, _>>()?;
+    let mut deformer = shape::Deformer::default();
+    for (job, (mut vertices, mut indices, mut leftover)) in plan.jobs.iter().zip(built) {
+        if let Some(shape) = job.shape {
+            let shape = &mut shapes[shape];
+            deformer.add(accessors, job, shape, scene)?;
+            (vertices, indices, leftover) =
+                (Some(shape.vertices.clone()), shape.indices.clone(), shape.leftover);
+        }
         if leftover {
             scene.warnings.push(format!("{}: indices left over after the last triangle are ignored", job.at));
         }
@@ -121,7 +160,8 @@ pub(super) fn convert(
         scene.indices.extend_from_slice(&indices);
     }
     let mut next = 0;
-    Ok(counts
+    Ok(plan
+        .counts
         .iter()
         .map(|&count| {
             let range = next..next + count;
@@ -133,13 +173,7 @@ pub(super) fn convert(
 
 /// Gives vertices without a normal the mean normal of their faces, weighted by area.
 fn fill_zero_normals(scene: &mut Scene, range: &std::ops::Range<u32>, vertices: &[u32], indices: &[u32]) {
-    let mut sums = vec![Vec3::ZERO; range.len()];
-    let positions_os = &scene.positions_os[range.start as usize..range.end as usize];
-    for t in indices.chunks_exact(3) {
-        let [a, b, c] = [t[0], t[1], t[2]].map(|i| Vec3::from(positions_os[i as usize]));
-        let normal = (b - a).cross(c - a);
-        t.iter().for_each(|&i| sums[i as usize] += normal);
-    }
+    let sums = face_sums(&scene.positions_os[range.start as usize..range.end as usize], indices);
     let attributes = &mut scene.attributes[range.start as usize..range.end as usize];
     for &vertex in vertices {
         let sum = sums[vertex as usize];
@@ -148,6 +182,17 @@ fn fill_zero_normals(scene: &mut Scene, range: &std::ops::Range<u32>, vertices: 
             attributes[vertex as usize].normal_os_oct = packed.normal_os_oct;
         }
     }
+}
+
+/// For each vertex the sum of its faces' normals, weighted by area.
+fn face_sums(positions_os: &[[f32; 3]], indices: &[u32]) -> Vec<Vec3> {
+    let mut sums = vec![Vec3::ZERO; positions_os.len()];
+    for t in indices.chunks_exact(3) {
+        let [a, b, c] = [t[0], t[1], t[2]].map(|i| Vec3::from(positions_os[i as usize]));
+        let normal = (b - a).cross(c - a);
+        t.iter().for_each(|&i| sums[i as usize] += normal);
+    }
+    sums
 }
 
 fn append(scene: &mut Scene, vertices: Vertices) -> Placed {
@@ -185,18 +230,13 @@ pub(super) fn check_unused(
     })
 }
 
-/// Lists the primitives to convert and, for each variant, how many there are. Materials that
-/// are missing are added to the scene, vertex streams that primitives can share to `shared`.
-fn plan<'a>(
-    root: &'a Root,
-    variants: &'a [Variant],
-    scene: &mut Scene,
-    shared: &mut Vec<Streams>,
-) -> (Vec<Job<'a>>, Vec<u32>) {
+/// Lists the primitives to convert. Materials that are missing are added to the scene.
+fn plan<'a>(root: &'a Root, variants: &'a [Variant], scene: &mut Scene) -> Plan<'a> {
     let mut default_material = None;
     let mut known: HashMap<Streams, usize> = HashMap::new();
-    let mut jobs = Vec::new();
-    let mut counts = Vec::new();
+    // by the file's mesh, the primitive's number, and whether a skin moves it
+    let mut known_shapes: HashMap<(usize, usize, bool), usize> = HashMap::new();
+    let Plan { mut jobs, mut counts, streams: mut shared, mut shapes } = Plan::default();
     for variant in variants {
         let json = &root.meshes[variant.mesh];
         let before = jobs.len();
@@ -232,8 +272,7 @@ fn plan<'a>(
             let tangents_from = normal_map.filter(|&set| tangents.is_none() && uv[set].is_some());
             let colors = attribute(Semantic::Colors(0));
             let streams = Streams { positions, normals, tangents, uv, colors };
-            let deformed = !variant.joints.is_empty() || variant.weights.iter().any(|&w| w != 0.0);
-            let can_share = normals.is_some() && tangents_from.is_none() && !deformed;
+            let can_share = normals.is_some() && tangents_from.is_none() && !variant.is_deformed();
             let shared = can_share.then(|| {
                 *known.entry(streams).or_insert_with(|| {
                     shared.push(streams);
@@ -242,11 +281,17 @@ fn plan<'a>(
             });
             let name = json.name.clone().unwrap_or_else(|| format!("meshes[{}]", variant.mesh));
             let name = if json.primitives.len() > 1 { format!("{name}[{k}]") } else { name };
-            jobs.push(Job { at, name, primitive, variant, material, tangents_from, streams, shared });
+            let shape = variant.is_deformed().then(|| {
+                *known_shapes.entry((variant.mesh, k, variant.skin.is_some())).or_insert_with(|| {
+                    shapes.push(jobs.len());
+                    shapes.len() - 1
+                })
+            });
+            jobs.push(Job { at, name, primitive, variant, material, tangents_from, streams, shared, shape });
         }
         counts.push((jobs.len() - before) as u32);
     }
-    (jobs, counts)
+    Plan { jobs, counts, streams: shared, shapes }
 }
 
 fn textures(m: &Material) -> impl Iterator<Item = Option<&crate::TextureRef>> {
@@ -261,20 +306,26 @@ fn textures(m: &Material) -> impl Iterator<Item = Option<&crate::TextureRef>> {
 }
 
 /// Refuses, before memory is taken, more vertices or indices than a scene can hold.
-fn check_size(accessors: &Accessors, jobs: &[Job], shared: &[Streams]) -> Result<(), SceneError> {
+fn check_size(accessors: &Accessors, plan: &Plan) -> Result<(), SceneError> {
     let vertex_count = |s: &Streams| accessors.layouts[s.positions].count as u64;
-    let mut vertices: u64 = shared.iter().map(vertex_count).sum();
+    let mut vertices: u64 = plan.streams.iter().map(vertex_count).sum();
     let mut indices = 0;
-    for job in jobs {
+    let list_count = |job: &Job| {
         let corner_count = match job.primitive.indices {
             Some(a) => accessors.layouts[a.value()].count as u64,
             None => vertex_count(&job.streams),
         };
-        let list_count = if job.primitive.mode == Checked::Valid(Mode::Triangles) {
-            corner_count
-        } else {
-            3 * corner_count
-        };
+        if job.primitive.mode == Checked::Valid(Mode::Triangles) { corner_count } else { 3 * corner_count }
+    };
+    // a shape is about as large as its vertices, and so is each of its targets
+    for &job in &plan.shapes {
+        let job = &plan.jobs[job];
+        let lists = 1 + job.primitive.targets.as_ref().map_or(0, Vec::len) as u64;
+        let count = vertex_count(&job.streams).max(list_count(job));
+        vertices = vertices.saturating_add(count.saturating_mul(lists));
+    }
+    for job in &plan.jobs {
+        let list_count = list_count(job);
         indices += list_count;
         if job.shared.is_none() {
             vertices += vertex_count(&job.streams).max(list_count);
@@ -350,14 +401,15 @@ fn shared_vertices(accessors: &Accessors, streams: &Streams) -> Result<Vertices,
 /// Converts one primitive: its own vertices if it has any, its triangle list, and whether
 /// indices were left over.
 fn build(accessors: &Accessors, job: &Job) -> Result<(Option<Vertices>, Vec<u32>, bool), SceneError> {
+    if job.shape.is_some() {
+        return Ok((None, Vec::new(), false));
+    }
     let vertex_count = accessors.layout(job.streams.positions)?.count;
     let (mut indices, leftover) = triangle_list(accessors, job.primitive, vertex_count)?;
     if job.shared.is_some() {
         return Ok((None, indices, leftover));
     }
     let mut v = Unpacked::read(accessors, &job.streams)?;
-    apply_morph_targets(accessors, job, &mut v)?;
-    apply_skin(accessors, job, &mut v)?;
     if v.normals_os.is_empty() {
         v = v.gather(&indices);
         for corners in v.positions_os.chunks_exact(3) {
@@ -439,87 +491,6 @@ fn to_triangles(mut corners: Vec<u32>, mode: Checked<Mode>) -> (Vec<u32>, bool) 
         _ => {
             corners.truncate(n - n % 3);
             (corners, !n.is_multiple_of(3))
-        }
-    }
-}
-
-fn apply_morph_targets(accessors: &Accessors, job: &Job, v: &mut Unpacked) -> Result<(), SceneError> {
-    let targets = job.primitive.targets.iter().flatten();
-    for (target, &weight) in targets.zip(&job.variant.weights).filter(|(_, w)| **w != 0.0) {
-        let add = |base: &mut [[f32; 3]], accessor: Option<usize>| -> Result<(), SceneError> {
-            let Some(accessor) = accessor else { return Ok(()) };
-            for (b, d) in base.iter_mut().zip(accessors.floats::<3>(accessor, 3, 0.0)?) {
-                *b = (Vec3::from(*b) + weight * Vec3::from(d)).to_array();
-            }
-            Ok(())
-        };
-        add(&mut v.positions_os, target.positions.map(|a| a.value()))?;
-        add(&mut v.normals_os, target.normals.map(|a| a.value()))?;
-        if let Some(accessor) = target.tangents {
-            for (b, d) in v.tangents_os.iter_mut().zip(accessors.floats::<3>(accessor.value(), 3, 0.0)?) {
-                for (b, d) in b.iter_mut().zip(d) {
-                    *b += weight * d;
-                }
-            }
-        }
-    }
-    check_finite(accessors, job, &v.positions_os)
-}
-
-/// Places skinned vertices in world space: each by the weighted sum of its joints' matrices.
-fn apply_skin(accessors: &Accessors, job: &Job, v: &mut Unpacked) -> Result<(), SceneError> {
-    let joints = &job.variant.joints;
-    if joints.is_empty() {
-        return Ok(());
-    }
-    let mut matrices = vec![Mat4::ZERO; v.positions_os.len()];
-    let mut totals = vec![0.0f32; v.positions_os.len()];
-    for set in 0.. {
-        let attribute = |s| job.primitive.attributes.get(&Checked::Valid(s)).map(|a| a.value());
-        let (Some(ids), Some(weights)) =
-            (attribute(Semantic::Joints(set)), attribute(Semantic::Weights(set)))
-        else {
-            break;
-        };
-        let weights = accessors.floats::<4>(weights, 4, 0.0)?;
-        for (k, (id, weight)) in accessors.uvec4(ids)?.into_iter().zip(weights).enumerate() {
-            for (id, weight) in id.into_iter().zip(weight).filter(|(_, w)| *w != 0.0) {
-                let Some(matrix) = joints.get(id as usize) else {
-                    let at = format!("{} element {k}", accessors.place(ids));
-                    return Err(check::unresolved(accessors.file, at, id as usize, joints.len()));
-                };
-                matrices[k] += *matrix * weight;
-                totals[k] += weight;
-            }
-        }
-    }
-    for (k, (matrix, total)) in matrices.iter().zip(totals).enumerate() {
-        // weights that do not add up to one are scaled so that they do; without any, the first joint holds it
-        let matrix = if total > 0.0 { *matrix * (1.0 / total) } else { joints[0] };
-        let turn = Mat3::from_mat4(matrix);
-        v.positions_os[k] = matrix.transform_point3(v.positions_os[k].into()).to_array();
-        if let Some(n) = v.normals_os.get_mut(k) {
-            *n = (turn * Vec3::from(*n)).to_array();
-        }
-        if let Some(t) = v.tangents_os.get_mut(k) {
-            let turned = turn * Vec3::new(t[0], t[1], t[2]);
-            *t = turned.extend(t[3]).to_array();
-        }
-    }
-    check_finite(accessors, job, &v.positions_os)
-}
-
-fn check_finite(accessors: &Accessors, job: &Job, positions_os: &[[f32; 3]]) -> Result<(), SceneError> {
-    match positions_os.iter().position(|p| !p.iter().all(|c| c.is_finite())) {
-        None => Ok(()),
-        Some(k) => {
-            let at = format!("{} vertex {k}", job.at);
-            Err(SceneError::invalid(
-                accessors.file,
-                at,
-                format!("{:?}", positions_os[k]),
-                "finite numbers after morphing and skinning",
-            ))
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Animations of nodes.
+//! Animations of nodes and of the weights of morph targets.
 
 use std::collections::BTreeMap;
 
@@ -16,7 +16,7 @@ use super::{
 };
 use crate::{
     SceneError,
-    animation::{Animation, Curve, Interpolation, NodeTrack},
+    animation::{Animation, Curve, Interpolation, NodeTrack, WeightTrack},
 };
 
 /// Reads all animations; channels of nodes outside of the scene are left out.
@@ -45,8 +45,8 @@ fn convert_one(
     warnings: &mut Vec<String>,
 ) -> Result<Animation, SceneError> {
     let mut tracks: BTreeMap<u32, NodeTrack> = BTreeMap::new();
+    let mut weights: BTreeMap<u32, WeightTrack> = BTreeMap::new();
     let mut duration_s = 0.0f32;
-    let mut weights_seen = false;
     for (k, channel) in animation.channels.iter().enumerate() {
         let at = format!("animations[{index}].channels[{k}]");
         let invalid = |found: &str, expected: &str| SceneError::invalid(accessors.file, &at, found, expected);
@@ -59,8 +59,21 @@ fn convert_one(
         let cubic = interpolation == Interpolation::CubicSpline;
         let value_count = times_s.len() * if cubic { 3 } else { 1 };
         duration_s = duration_s.max(times_s.last().copied().unwrap_or(0.0));
+        let doubled = || invalid("a second channel for the same property", "one");
         if property == Property::MorphTargetWeights {
-            weights_seen = true;
+            let target_count = target_count(root, target);
+            if target_count == 0 {
+                warnings.push(format!("{at}: node {target} has no morph targets whose weights could move"));
+                continue;
+            }
+            let count = value_count.saturating_mul(target_count);
+            let values = read_weights(accessors, &at, sampler.output.value(), count)?;
+            let Some(node) = placement.scene_node[target] else { continue };
+            let curve = Curve { times_s, values, interpolation };
+            let track = WeightTrack { node, target_count: target_count as u32, curve };
+            if weights.insert(node, track).is_some() {
+                return Err(doubled());
+            }
             continue;
         }
         if root.nodes[target].matrix.is_some() {
@@ -76,7 +89,6 @@ fn convert_one(
             ..NodeTrack::default()
         });
         let output = sampler.output.value();
-        let doubled = invalid("a second channel for the same property", "one");
         match property {
             Property::Rotation => {
                 let values = read_values::<4>(accessors, &at, output, value_count)?;
@@ -94,7 +106,7 @@ fn convert_one(
                 };
                 let values = values.into_iter().enumerate().map(unit).collect();
                 if track.rotation.replace(Curve { times_s, values, interpolation }).is_some() {
-                    return Err(doubled);
+                    return Err(doubled());
                 }
             }
             _ => {
@@ -104,16 +116,23 @@ fn convert_one(
                 let slot =
                     if property == Property::Scale { &mut track.scale } else { &mut track.translation };
                 if slot.replace(curve).is_some() {
-                    return Err(doubled);
+                    return Err(doubled());
                 }
             }
         }
     }
-    if weights_seen {
-        warnings.push(format!("animations[{index}]: animated morph weights are not played"));
-    }
-    let name = animation.name.clone().unwrap_or_else(|| format!("animations[{index}]"));
-    Ok(Animation { name, duration_s: f64::from(duration_s), tracks: tracks.into_values().collect() })
+    Ok(Animation {
+        name: animation.name.clone().unwrap_or_else(|| format!("animations[{index}]")),
+        duration_s: f64::from(duration_s),
+        tracks: tracks.into_values().collect(),
+        weights: weights.into_values().collect(),
+    })
+}
+
+/// Number of morph targets of a node's mesh; all of its primitives have as many.
+fn target_count(root: &Root, node: usize) -> usize {
+    let primitive = root.nodes[node].mesh.and_then(|mesh| root.meshes[mesh.value()].primitives.first());
+    primitive.and_then(|primitive| primitive.targets.as_ref()).map_or(0, Vec::len)
 }
 
 fn read_times(
@@ -146,6 +165,27 @@ fn read_times(
         ));
     }
     Ok((times_s, interpolation))
+}
+
+/// Weights: one a target for each value that the keys need.
+fn read_weights(
+    accessors: &Accessors,
+    at: &str,
+    output: usize,
+    count: usize,
+) -> Result<Vec<f32>, SceneError> {
+    let layout = accessors.layout(output)?;
+    let at = || format!("{at}, sampler output {}", accessors.place(output));
+    let fits = layout.component == ComponentType::F32 || layout.normalized;
+    if !fits || layout.shape != Type::Scalar {
+        let found = format!("{:?} of {:?}", layout.shape, layout.component);
+        return Err(SceneError::invalid(accessors.file, at(), found, "SCALAR of F32 or normalized integers"));
+    }
+    if layout.count != count {
+        let expected = format!("{count}, as its keys and targets need");
+        return Err(SceneError::invalid(accessors.file, at(), format!("{} values", layout.count), expected));
+    }
+    Ok(accessors.floats::<1>(output, 1, 0.0)?.into_iter().map(|[weight]| weight).collect())
 }
 
 fn read_values<const N: usize>(

@@ -1,6 +1,9 @@
 //! Nodes, and what hangs on them: draws, lights, cameras, skins.
 
-use std::{collections::HashMap, path::Path};
+use std::{
+    collections::{HashMap, HashSet},
+    path::Path,
+};
 
 use glam::{Affine3A, DAffine3, DMat4, DQuat, DVec3, Mat4, Vec3};
 use gltf::json::{
@@ -14,9 +17,16 @@ use gltf::json::{
 use serde::Deserialize;
 
 use super::{accessor::Accessors, check, mesh::Variant};
-use crate::{Camera, Instance, Light, LightKind, Node, Projection, Scene, SceneError, animation};
+use crate::{
+    Attachment, Camera, Instance, Light, LightKind, Node, Projection, Scene, SceneError, Skin, animation,
+    pose,
+};
 
-/// Most nodes and most draws of a scene: instancing lets a short file ask for many.
+/// What is counted against [`INSTANCE_COUNT_MAX`], for messages.
+const NODES: &str = "nodes and draws";
+
+/// Most nodes and most draws of a scene: instancing lets a short file ask for many. So many matrices of joints and weights as well: a short
+/// file can draw one mesh with many joints or targets many times.
 const INSTANCE_COUNT_MAX: u64 = 1 << 22;
 
 /// Translation, rotation and scale.
@@ -170,7 +180,7 @@ pub(super) struct Draws {
     draws: Vec<Draw>,
 }
 
-/// Finds what is drawn where. Skinned meshes are drawn by a node of their own at the world's
+/// Finds what is drawn where, and the skins. Skinned meshes are drawn by a node of their own at the world's
 /// origin, instanced ones (EXT_mesh_gpu_instancing) by a child node for each instance.
 pub(super) fn find_draws(
     accessors: &Accessors,
@@ -179,36 +189,53 @@ pub(super) fn find_draws(
     scene: &mut Scene,
 ) -> Result<Draws, SceneError> {
     let rest_worlds = scene.file_from_nodes(None);
+    let tracks = scene.animations.iter().flat_map(|animation| &animation.weights);
+    let animated: HashSet<u32> = tracks.map(|track| track.node).collect();
     let mut plain: HashMap<usize, usize> = HashMap::new();
-    let mut variants = Vec::new();
+    let mut skins: HashMap<usize, u32> = HashMap::new();
+    let mut variants: Vec<Variant> = Vec::new();
+    let (mut matrix_count, mut weight_count) = (0, 0);
     let mut draws = Vec::new();
     for &index in &placement.order {
         let node = &root.nodes[index];
         let (Some(mesh), Some(place)) = (node.mesh, placement.scene_node[index]) else { continue };
         let json = &root.meshes[mesh.value()];
-        let has_targets = json.primitives.iter().any(|p| p.targets.as_ref().is_some_and(|t| !t.is_empty()));
-        let weights = if has_targets { node.weights.as_ref().or(json.weights.as_ref()) } else { None };
-        if has_targets {
-            scene
-                .warnings
-                .push(format!("nodes[{index}]: morph targets are drawn with their weights at rest"));
-        }
+        let targets = |p: &json::mesh::Primitive| p.targets.as_ref().map_or(0, Vec::len);
+        let target_count = json.primitives.iter().map(targets).max().unwrap_or(0);
+        let mut weights = node.weights.as_ref().or(json.weights.as_ref()).cloned().unwrap_or_default();
+        weights.resize(target_count, 0.0);
         let skinned =
             json.primitives.iter().any(|p| p.attributes.contains_key(&Checked::Valid(Semantic::Joints(0))));
         let skin = node.skin.filter(|_| skinned);
         let mut variant =
-            Variant { mesh: mesh.value(), weights: weights.cloned().unwrap_or_default(), joints: Vec::new() };
-        let mut draw_node = place;
+            Variant { mesh: mesh.value(), weights, skin: None, node: place, object_node: place };
         if let Some(skin) = skin {
-            scene.warnings.push(format!("nodes[{index}]: its skin is drawn in the rest pose"));
-            let skin = (skin.value(), skin_origin(root, placement, &rest_worlds, skin.value()));
-            variant.joints = joint_matrices(accessors, root, placement, &rest_worlds, skin)?;
-            draw_node = scene.nodes.len() as u32;
+            let skin = skin.value();
+            let known = match skins.get(&skin) {
+                Some(&known) => known,
+                None => {
+                    scene.skins.push(convert_skin(accessors, root, placement, skin, &mut scene.warnings)?);
+                    let new = scene.skins.len() as u32 - 1;
+                    skins.insert(skin, new);
+                    new
+                }
+            };
+            variant.skin = Some(known);
+            variant.object_node = scene.nodes.len() as u32;
             let name = format!("{} (skinned)", scene.nodes[place as usize].name);
-            scene.nodes.push(Node { name, parent: None, local: DAffine3::from_translation(skin.1) });
+            let origin = skin_origin(root, placement, &rest_worlds, skin);
+            scene.nodes.push(Node { name, parent: None, local: DAffine3::from_translation(origin) });
         }
-        let own_shape = skin.is_some() || node.weights.is_some() && has_targets;
-        let variant = if own_shape {
+        let draw_node = variant.object_node;
+        if let Some(skin) = variant.skin {
+            matrix_count += scene.skins[skin as usize].joints.len();
+            check_count(accessors.file, "matrices of joints", matrix_count)?;
+        }
+        weight_count += target_count;
+        check_count(accessors.file, "weights of morph targets", weight_count)?;
+        // A mesh has one shape at a time: nodes that can be shaped in ways of their own have vertices of their own.
+        let own_weights = target_count > 0 && (node.weights.is_some() || animated.contains(&place));
+        let variant = if skin.is_some() || own_weights {
             variants.push(variant);
             variants.len() - 1
         } else {
@@ -224,7 +251,7 @@ pub(super) fn find_draws(
                 let at = format!("nodes[{index}].extensions.{INSTANCING}");
                 let instances = instance_transforms(accessors, &at, extension)?;
                 let name = scene.nodes[place as usize].name.clone();
-                check_count(accessors.file, scene.nodes.len() + instances.len())?;
+                check_count(accessors.file, NODES, scene.nodes.len() + instances.len())?;
                 for (k, trs) in instances.into_iter().enumerate() {
                     let node = scene.nodes.len() as u32;
                     scene.nodes.push(Node {
@@ -242,9 +269,9 @@ pub(super) fn find_draws(
 
 const INSTANCING: &str = "EXT_mesh_gpu_instancing";
 
-fn check_count(file: &Path, count: usize) -> Result<(), SceneError> {
+fn check_count(file: &Path, what: &str, count: usize) -> Result<(), SceneError> {
     if count as u64 > INSTANCE_COUNT_MAX {
-        let what = "nodes and draws".to_owned();
+        let what = what.to_owned();
         return Err(SceneError::TooLarge {
             file: file.to_owned(),
             what,
@@ -264,42 +291,42 @@ fn skin_origin(root: &Root, placement: &Placement, worlds: &[DAffine3], skin: us
     })
 }
 
-/// The skin's origin from bind space for each joint of a skin, at rest.
-fn joint_matrices(
+/// A skin with its joints among the nodes of the scene.
+fn convert_skin(
     accessors: &Accessors,
     root: &Root,
     placement: &Placement,
-    worlds: &[DAffine3],
-    (index, origin): (usize, DVec3),
-) -> Result<Vec<Mat4>, SceneError> {
+    index: usize,
+    warnings: &mut Vec<String>,
+) -> Result<Skin, SceneError> {
     let skin = &root.skins[index];
-    let bind = match skin.inverse_bind_matrices {
-        None => vec![Mat4::IDENTITY.to_cols_array(); skin.joints.len()],
-        Some(accessor) => accessors.floats::<16>(accessor.value(), 16, 0.0)?,
-    };
+    let at = |rest: &str| format!("skins[{index}]{rest}");
     if skin.joints.is_empty() {
-        return Err(SceneError::invalid(
-            accessors.file,
-            format!("skins[{index}].joints"),
-            "none",
-            "1 or more",
-        ));
+        return Err(SceneError::invalid(accessors.file, at(".joints"), "none", "1 or more"));
     }
-    let joints = skin.joints.iter().zip(bind).enumerate();
-    joints
-        .map(|(k, (joint, bind))| match placement.scene_node[joint.value()] {
-            Some(node) => {
-                let world = DMat4::from_translation(-origin) * DMat4::from(worlds[node as usize]);
-                Ok((world * Mat4::from_cols_array(&bind).as_dmat4()).as_mat4())
-            }
-            None => Err(SceneError::invalid(
-                accessors.file,
-                format!("skins[{index}].joints[{k}]"),
-                format!("node {}", joint.value()),
-                "a node of the scene that is drawn",
-            )),
+    let joint = |(k, joint): (usize, &json::Index<json::Node>)| {
+        placement.scene_node[joint.value()].ok_or_else(|| {
+            let found = format!("node {}", joint.value());
+            let expected = "a node of the scene that is drawn";
+            SceneError::invalid(accessors.file, at(&format!(".joints[{k}]")), found, expected)
         })
-        .collect()
+    };
+    let joints = skin.joints.iter().enumerate().map(joint).collect::<Result<Vec<_>, _>>()?;
+    let mut joint_from_bind = vec![Affine3A::IDENTITY; joints.len()];
+    if let Some(accessor) = skin.inverse_bind_matrices {
+        let mut is_affine = true;
+        for (own, m) in joint_from_bind.iter_mut().zip(accessors.floats::<16>(accessor.value(), 16, 0.0)?) {
+            is_affine &= [m[3], m[7], m[11], m[15]] == [0.0, 0.0, 0.0, 1.0];
+            *own = Affine3A::from_mat4(Mat4::from_cols_array(&m));
+        }
+        if !is_affine {
+            warnings.push(format!(
+                "{}: last rows other than 0, 0, 0, 1 are not used",
+                at(".inverseBindMatrices")
+            ));
+        }
+    }
+    Ok(Skin { name: skin.name.clone().unwrap_or_else(|| at("")), joints, joint_from_bind })
 }
 
 fn instance_transforms(
@@ -331,7 +358,7 @@ fn instance_transforms(
             "as many in each",
         ));
     }
-    check_count(file, count)?;
+    check_count(file, NODES, count)?;
     let vec3 = |a: Option<usize>, rest: f32| {
         a.map_or(Ok(vec![[rest; 3]; count]), |a| accessors.floats::<3>(a, 3, 0.0))
     };
@@ -355,7 +382,16 @@ pub(super) fn make_instances(
     time_s: Option<f64>,
     scene: &mut Scene,
 ) -> Result<(), SceneError> {
-    let file_from_nodes = scene.file_from_nodes(time_s);
+    let playing = time_s.and_then(|time_s| scene.animations.first().map(|a| (a, a.wrap(time_s))));
+    let (mut file_from_nodes, mut joints, mut weights) = (Vec::new(), Vec::new(), Vec::new());
+    scene.file_from_nodes_into(playing, &mut file_from_nodes);
+    scene.joints_into(&file_from_nodes, &mut joints);
+    scene.weights_into(playing, &mut weights);
+    if let Some((mesh, vertex)) = scene.write_deformed(&joints, &weights) {
+        let at = format!("mesh {:?} vertex {vertex}", scene.meshes[mesh as usize].name);
+        let expected = "finite numbers after morphing and skinning";
+        return Err(SceneError::invalid(file, at, "a place that overflows", expected));
+    }
     let mut worlds = Vec::with_capacity(draws.draws.len());
     for draw in &draws.draws {
         let file_from_object = file_from_nodes[draw.node as usize];
@@ -369,7 +405,7 @@ pub(super) fn make_instances(
                 "finite numbers",
             ));
         }
-        check_count(file, scene.instances.len() + meshes[draw.variant].len())?;
+        check_count(file, NODES, scene.instances.len() + meshes[draw.variant].len())?;
         let instance = |mesh| Instance { mesh, node: draw.node, world_from_object: world };
         scene.instances.extend(meshes[draw.variant].clone().map(instance));
         worlds.resize(scene.instances.len(), file_from_object);
@@ -392,22 +428,29 @@ pub(super) fn make_lights_and_cameras(
     let lights =
         root.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref()).map_or(&[][..], |l| &l.lights);
     let lights = lights.iter().enumerate().map(|(i, l)| light(file, i, l)).collect::<Result<Vec<_>, _>>()?;
+    let is_animated = !scene.animations.is_empty();
     for &index in &placement.order {
         let node = &root.nodes[index];
         let Some(place) = placement.scene_node[index] else { continue };
         let world = worlds[place as usize];
         if let Some(l) = node.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref()) {
-            let direction_ws = world.transform_vector3(Vec3::NEG_Z).try_normalize().unwrap_or(Vec3::NEG_Y);
-            let position_ws = world.translation.into();
-            scene.lights.push(Light { position_ws, direction_ws, ..lights[l.light.value()] });
+            if is_animated {
+                scene.light_nodes.push(Attachment { index: scene.lights.len() as u32, node: place });
+            }
+            scene.lights.push(pose::placed(&lights[l.light.value()], &world));
         }
         if let Some(c) = node.camera {
             let json = &root.cameras[c.value()];
             let name =
                 json.name.clone().or(node.name.clone()).unwrap_or_else(|| format!("camera {}", c.value()));
-            match rigid(&world) {
+            match pose::rigid(&world) {
                 Some(world_from_view) => {
                     let projection = projection(file, c.value(), json)?;
+                    if is_animated {
+                        scene
+                            .camera_nodes
+                            .push(Attachment { index: scene.cameras.len() as u32, node: place });
+                    }
                     scene.cameras.push(Camera { name, world_from_view, projection });
                 }
                 None => scene.warnings.push(format!("camera {name:?} has no orientation and is left out")),
@@ -415,14 +458,6 @@ pub(super) fn make_lights_and_cameras(
         }
     }
     Ok(())
-}
-
-/// Position and orientation of a frame without its scale; the view direction −Z is kept.
-fn rigid(world: &Affine3A) -> Option<Affine3A> {
-    let z = Vec3::from(world.matrix3.z_axis).try_normalize()?;
-    let x = Vec3::from(world.matrix3.y_axis).cross(z).try_normalize()?;
-    let frame = Affine3A::from_cols(x.into(), z.cross(x).into(), z.into(), world.translation);
-    frame.is_finite().then_some(frame)
 }
 
 fn projection(file: &Path, index: usize, camera: &json::Camera) -> Result<Projection, SceneError> {
@@ -520,8 +555,8 @@ mod tests {
     #[test]
     fn a_scene_has_at_most_4_million_nodes_and_draws() {
         let file = Path::new("test.gltf");
-        assert!(check_count(file, 1 << 22).is_ok());
-        let error = check_count(file, (1 << 22) + 1).expect_err("one more").to_string();
+        assert!(check_count(file, NODES, 1 << 22).is_ok());
+        let error = check_count(file, NODES, (1 << 22) + 1).expect_err("one more").to_string();
         assert!(error.contains("found 4194305, expected at most 4194304"), "{error}");
     }
 }

@@ -52,6 +52,34 @@ pub fn check_scene(scene: &Scene) -> Result<(), String> {
         fail((instance.node as usize) < scene.nodes.len(), "an instance's node")?;
         fail(instance.world_from_object.is_finite(), "a finite place")?;
     }
+    for d in &scene.deformations {
+        let (Some(mesh), Some(shape)) =
+            (scene.meshes.get(d.mesh as usize), scene.shapes.get(d.shape as usize))
+        else {
+            return fail(false, "a deformation's mesh and shape");
+        };
+        let count = mesh.vertex_count as usize;
+        fail(shape.positions_os.len() == count && shape.frames_os.len() == count, "as many vertices")?;
+        fail(shape.influences.len() == count * shape.set_count as usize, "joints of every vertex")?;
+        let list = |list: &[[f32; 3]]| list.is_empty() || list.len() == count;
+        let whole = |t: &afterlight_scene::MorphTarget| {
+            list(&t.positions_os) && list(&t.normals_os) && list(&t.tangents_os)
+        };
+        fail(shape.targets.iter().all(whole), "a target's difference of every vertex")?;
+        fail(!shape.is_flat || count.is_multiple_of(3), "three vertices a flat triangle")?;
+        fail((d.object_node.max(d.weights_node) as usize) < scene.nodes.len(), "a deformation's nodes")?;
+        fail(d.weights(scene).end <= scene.rest_weights.len(), "weights in range")?;
+        fail(d.skin.is_none_or(|skin| (skin as usize) < scene.skins.len()), "a deformation's skin")?;
+        let joints = d.joints(scene);
+        let used = shape.joint_bounds.iter().all(|b| d.skin.is_none() || (b.joint as usize) < joints.len());
+        fail(used, "joints in range")?;
+    }
+    fail(scene.deformations.is_sorted_by(|a, b| a.mesh < b.mesh), "deformations by rising mesh")?;
+    fail(scene.deformations.is_sorted_by_key(|d| d.weights_node), "deformations by rising node")?;
+    for skin in &scene.skins {
+        fail(skin.joints.len() == skin.joint_from_bind.len() && !skin.joints.is_empty(), "a matrix a joint")?;
+        fail(skin.joints.iter().all(|&j| (j as usize) < scene.nodes.len()), "joints among the nodes")?;
+    }
     for m in &scene.materials {
         let textures = [
             m.base_color_texture,
