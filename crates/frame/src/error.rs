@@ -43,11 +43,19 @@ pub enum TechniqueError {
         /// The instance, by its number in the scene.
         instance: u32,
     },
-    /// Nodes that move in a flight whose nodes were said to stand still.
+    /// A scene that moves in a flight of a scene that was said to stand still.
     #[error(
-        "nodes of a flight: found matrices of instances, expected none without FlightOptions::nodes_move"
+        "a flight of a scene that stands still: found a pose, expected none without FlightOptions::scene_moves"
     )]
-    NodesStandStill,
+    SceneStandsStill,
+    /// Lights that are not those which a flight was planned for.
+    #[error(
+        "lights of a pose: found others than the {expected} that the flight was planned for, expected as many of the same kinds"
+    )]
+    OtherLights {
+        /// Lights that were planned for.
+        expected: u32,
+    },
     /// Something larger than the device takes.
     #[error("{what}: found {found}, expected at most {limit}")]
     TooLarge {

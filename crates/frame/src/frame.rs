@@ -60,6 +60,8 @@ pub struct Frame<'a> {
     pub inputs: &'a ViewInputs,
     /// Whether the frame will be run from other views too: what some view needs is recorded, be it empty in this one.
     pub moves: bool,
+    /// Whether surfaces and lights may move then: what depends on where they are is an input or a script.
+    pub scene_moves: bool,
     /// What the parts of the frame hand on.
     pub board: Board,
 }

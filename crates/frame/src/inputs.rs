@@ -148,11 +148,46 @@ impl ViewInputs {
         let stream =
             self.declare(device, graph, named, how, |view, bytes| put(bytes, 0, &view.placed.records))?;
         // A record of four texels is as long as in the stream.
-        let name = "scene draw records";
-        let [width, height] = scene.draw_data.extent();
+        let named = ("scene draw records", BufferRole::Scene);
+        let records = self.declare_like(device, graph, named, &scene.draw_data, |view, bytes| {
+            put(bytes, 0, &view.placed.records);
+        })?;
+        Ok((stream, records))
+    }
+
+    /// Records and spheres of lights, for each pose.
+    ///
+    /// # Errors
+    /// The device.
+    pub fn declare_lights(
+        &self,
+        device: &gpu::Device,
+        graph: &mut Graph,
+        lights: &SceneLights,
+    ) -> Result<(ImageHandle, ImageHandle), TechniqueError> {
+        let named = ("lights", BufferRole::Lights);
+        let data = self
+            .declare_like(device, graph, named, &lights.data, |view, bytes| view.lights.fill_data(bytes))?;
+        let named = ("light spheres", BufferRole::Lights);
+        let spheres = self.declare_like(device, graph, named, &lights.spheres, |view, bytes| {
+            view.lights.fill_spheres(bytes)
+        })?;
+        Ok((data, spheres))
+    }
+
+    /// An image of records like another one, filled for each pose.
+    fn declare_like(
+        &self,
+        device: &gpu::Device,
+        graph: &mut Graph,
+        (name, role): (&str, BufferRole),
+        like: &gpu::Image,
+        fill: impl Fn(&View<'_>, &mut [u8]) + Send + Sync + 'static,
+    ) -> Result<ImageHandle, TechniqueError> {
+        let [width, height] = like.extent();
         let image = device.create_image(&gpu::ImageDesc {
             name,
-            format: scene.draw_data.format(),
+            format: like.format(),
             width,
             height,
             layers: 1,
@@ -160,14 +195,14 @@ impl ViewInputs {
             samples: 1,
             usage: vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST,
         })?;
-        let layout = vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL;
-        let handle = graph.import_image(name, BufferRole::Scene, &image, layout);
+        let handle = graph.import_image(name, role, &image, vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL);
+        let target = FrameInput::Image(image);
         self.inputs.borrow_mut().push(ViewInput {
-            target: FrameInput::Image(image),
+            target,
             changes_with: ChangesWith::Pose,
-            fill: Box::new(|view, bytes| put(bytes, 0, &view.placed.records)),
+            fill: Box::new(fill),
         });
-        Ok((stream, handle))
+        Ok(handle)
     }
 
     /// Brings the commands of the draws that `of_view` chooses into the graph, named after `name`: a range a bucket, with room for all.

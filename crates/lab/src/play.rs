@@ -85,7 +85,7 @@ pub fn play(
         in_flight: how.in_flight,
         shortfall: Shortfall::DrawAgain,
         pictures: sees.is_some(),
-        nodes_move: false,
+        scene_moves: false,
     };
     let first = path.at(how.place(0));
     let task = listener.task("preparing", chosen.len() as u64);
@@ -119,12 +119,7 @@ pub fn play(
                 (false, true) => {
                     let camera = path.at(how.place(frame));
                     flight.frame(
-                        FrameContext {
-                            index: frame,
-                            time_s: frame as f64 / how.fps,
-                            camera,
-                            world_from_objects: None,
-                        },
+                        FrameContext { index: frame, time_s: frame as f64 / how.fps, camera, pose: None },
                         &mut done,
                     )?;
                 }

@@ -10,7 +10,7 @@ use std::{
 };
 
 use afterlight_graph::{FrameSlot, FrameTimes, ResourceId};
-use afterlight_scene::Camera;
+use afterlight_scene::{Camera, Light};
 use glam::Affine3A;
 
 use crate::{Prepared, Renderer, renderer::Recipe};
@@ -41,13 +41,13 @@ pub struct FlightOptions {
     pub shortfall: Shortfall,
     /// Whether pictures are copied to where the host can read them.
     pub pictures: bool,
-    /// Whether instances may move ([`FrameContext::world_from_objects`]): the records of draws are then inputs of each frame.
-    pub nodes_move: bool,
+    /// Whether surfaces and lights may move ([`FrameContext::pose`]): their records are then inputs of each frame.
+    pub scene_moves: bool,
 }
 
 impl Default for FlightOptions {
     fn default() -> Self {
-        Self { in_flight: 3, shortfall: Shortfall::DrawAgain, pictures: false, nodes_move: false }
+        Self { in_flight: 3, shortfall: Shortfall::DrawAgain, pictures: false, scene_moves: false }
     }
 }
 
@@ -60,8 +60,17 @@ pub struct FrameContext {
     pub time_s: f64,
     /// The camera.
     pub camera: Camera,
-    /// World from object of each instance of the scene; `None` is where they were uploaded.
-    pub world_from_objects: Option<Arc<[Affine3A]>>,
+    /// Where surfaces and lights of the scene are; `None` is where they were uploaded.
+    pub pose: Option<Arc<ScenePose>>,
+}
+
+/// Where surfaces and lights of a scene are at one time.
+#[derive(Clone, Debug)]
+pub struct ScenePose {
+    /// World from object of each instance of the scene.
+    pub world_from_objects: Vec<Affine3A>,
+    /// The lights, as many and of the same kinds as the renderer's; `None` leaves them.
+    pub lights: Option<Vec<Light>>,
 }
 
 /// Something that costs a frame more than its neighbours.
@@ -138,7 +147,7 @@ impl Renderer {
         options: FlightOptions,
     ) -> Result<Flight<'r>, TechniqueError> {
         let params = completed(technique, params);
-        let recipe = Recipe { technique, params: &params, moves: true, nodes_move: options.nodes_move };
+        let recipe = Recipe { technique, params: &params, moves: true, scene_moves: options.scene_moves };
         let prepared = self.prepare_to_move(&recipe, camera)?;
         let mut flight = Flight {
             renderer: self,
@@ -225,11 +234,10 @@ impl Flight<'_> {
 
     /// Looks at what a frame shows.
     fn show(&mut self, context: &FrameContext) -> Result<(), TechniqueError> {
-        match &context.world_from_objects {
-            Some(_) if !self.options.nodes_move => return Err(TechniqueError::NodesStandStill),
-            Some(world_from_objects) => self.prepared.viewed.place(world_from_objects)?,
-            None => self.prepared.viewed.rest(),
+        if context.pose.is_some() && !self.options.scene_moves {
+            return Err(TechniqueError::SceneStandsStill);
         }
+        self.prepared.viewed.place(context.pose.as_deref())?;
         self.prepared.viewed.look_through(&context.camera);
         Ok(())
     }
@@ -276,13 +284,14 @@ impl Flight<'_> {
     }
 
     fn plan_anew(&mut self, camera: &Camera, capacities: Capacities) -> Result<(), TechniqueError> {
-        let settings = Settings { camera: camera.clone(), ..self.renderer.settings().clone() };
-        let moved = self.prepared.viewed.moved.take();
+        let lights = self.prepared.viewed.settings.lights.clone();
+        let settings = Settings { camera: camera.clone(), lights, ..self.renderer.settings().clone() };
+        let moved = std::mem::take(&mut self.prepared.viewed.moved);
         let recipe = Recipe {
             technique: self.technique,
             params: &self.params,
             moves: true,
-            nodes_move: self.options.nodes_move,
+            scene_moves: self.options.scene_moves,
         };
         self.prepared = self.renderer.record(&recipe, &settings, moved, capacities, &|_, _| {})?;
         self.demands = self.prepared.demands.clone().into();

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
+use crate::flight::ScenePose;
 use afterlight_graph::{Executor, FrameInput, FrameReport, ResourceId, gpu};
 use afterlight_scene::Camera;
-use glam::Affine3A;
 
 use afterlight_frame::{
     CameraView, DrawParams, LightPairs, SceneLights, Settings, TechniqueError, View, ViewInput, ViewInputs,
@@ -38,30 +38,35 @@ pub(crate) struct Kept {
     pub final_color: ResourceId,
 }
 
+/// Where surfaces and lights of a scene have moved to; nothing stands where it was uploaded.
+#[derive(Default)]
+pub(crate) struct Moved {
+    pub placed: Option<Box<Placed>>,
+    pub lights: Option<Arc<SceneLights>>,
+}
+
 /// What a frame shows: all from which its inputs are computed.
 pub(crate) struct Viewed {
     pub settings: Settings,
     pub scene: Arc<SceneGpu>,
-    pub lights: Arc<SceneLights>,
+    lights: Arc<SceneLights>,
     pub camera: CameraView,
     pub draws: DrawChoice,
-    /// Where surfaces stand, where that is not as in the scene.
-    pub moved: Option<Box<Placed>>,
+    pub moved: Moved,
     /// Counts the poses so far.
     pub pose: u64,
 }
 
 impl Viewed {
-    /// A view of a scene; surfaces stand where `moved` says, or as they were uploaded.
+    /// A view of a scene with its lights, whose surfaces and lights may have moved.
     pub fn new(
         settings: &Settings,
         scene: Arc<SceneGpu>,
         lights: Arc<SceneLights>,
-        moved: Option<Box<Placed>>,
+        moved: Moved,
         options: DrawParams,
     ) -> Self {
-        let placed = moved.as_deref().unwrap_or(&scene.rest);
-        let camera = CameraView::fitted(settings, placed);
+        let camera = CameraView::fitted(settings, moved.placed.as_deref().unwrap_or(&scene.rest));
         let draws = DrawChoice::new(options);
         let mut viewed = Self { settings: settings.clone(), camera, draws, moved, pose: 0, scene, lights };
         viewed.choose_draws();
@@ -71,28 +76,39 @@ impl Viewed {
     /// Looks through another camera.
     pub fn look_through(&mut self, camera: &Camera) {
         self.settings.camera.clone_from(camera);
-        self.camera = CameraView::fitted(&self.settings, self.moved.as_deref().unwrap_or(&self.scene.rest));
+        self.camera = CameraView::fitted(&self.settings, self.placed());
         self.choose_draws();
     }
 
-    /// Moves surfaces to where their instances are, one matrix each. The camera must be looked through again.
-    pub fn place(&mut self, world_from_objects: &[Affine3A]) -> Result<(), TechniqueError> {
-        let placed = self.moved.get_or_insert_with(|| Box::new(self.scene.rest.clone()));
-        self.pose += 1;
-        placed
-            .place(&self.scene.draw_sources, world_from_objects)
-            .map_err(|over: TurnedOver| TechniqueError::TurnedOver { instance: over.instance })
+    /// Where surfaces stand.
+    fn placed(&self) -> &Placed {
+        self.moved.placed.as_deref().unwrap_or(&self.scene.rest)
     }
 
-    /// Moves surfaces to where they were uploaded.
-    pub fn rest(&mut self) {
-        if self.moved.take().is_some() {
-            self.pose += 1;
+    /// Moves surfaces and lights to a pose, or to where they were uploaded. The camera must be looked through again.
+    pub fn place(&mut self, pose: Option<&ScenePose>) -> Result<(), TechniqueError> {
+        let is_at_rest = self.moved.placed.is_none() && self.moved.lights.is_none();
+        let Some(pose) = pose else {
+            self.moved = Moved::default();
+            self.pose += u64::from(!is_at_rest);
+            return Ok(());
+        };
+        self.pose += 1;
+        let placed = self.moved.placed.get_or_insert_with(|| Box::new(self.scene.rest.clone()));
+        placed
+            .place(&self.scene.draw_sources, &pose.world_from_objects)
+            .map_err(|over: TurnedOver| TechniqueError::TurnedOver { instance: over.instance })?;
+        if let Some(lights) = &pose.lights {
+            let moved = self.lights.moved(lights);
+            let moved = moved.ok_or(TechniqueError::OtherLights { expected: self.lights.count })?;
+            self.moved.lights = Some(Arc::new(moved));
+            self.settings.lights.clone_from(lights);
         }
+        Ok(())
     }
 
     fn choose_draws(&mut self) {
-        let placed = self.moved.as_deref().unwrap_or(&self.scene.rest);
+        let placed = self.moved.placed.as_deref().unwrap_or(&self.scene.rest);
         let displacement_m = self.settings.effects.tessellation.displacement_m();
         self.draws.update(&self.scene, &placed.infos, &self.camera, displacement_m);
     }
@@ -102,9 +118,9 @@ impl Viewed {
             camera: &self.camera,
             settings: &self.settings,
             scene: &self.scene,
-            lights: &self.lights,
+            lights: self.moved.lights.as_deref().unwrap_or(&self.lights),
             visible: &self.draws.visible,
-            placed: self.moved.as_deref().unwrap_or(&self.scene.rest),
+            placed: self.placed(),
         }
     }
 }

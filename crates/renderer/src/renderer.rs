@@ -9,7 +9,7 @@ use afterlight_graph::{
 use afterlight_scene::{Camera, Scene};
 use afterlight_shader::{Shader, structs::FrameConstants};
 
-use crate::prepared::{Kept, Prepared, Viewed};
+use crate::prepared::{Kept, Moved, Prepared, Viewed};
 use afterlight_frame::{
     Board, CameraView, ChangesWith, Cull, DrawParams, Frame, MAX_DISPLACEMENT_MM, MIN_TESSELLATE_PX,
     OpaqueDepth, Params, SceneBuffers, SceneLights, Settings, Technique, TechniqueError, TessellationEffect,
@@ -17,7 +17,7 @@ use afterlight_frame::{
     camera_view::{background_radiance, coarse_depth_warning},
     capacity::{self, Capacities},
     completed, put,
-    scene::{SceneGpu, placed::Placed},
+    scene::SceneGpu,
     upload::upload_slice,
     views,
 };
@@ -45,8 +45,8 @@ pub(crate) struct Recipe<'a> {
     pub params: &'a Params,
     /// Whether the frame is to be run from other views too.
     pub moves: bool,
-    /// Whether surfaces may stand elsewhere then.
-    pub nodes_move: bool,
+    /// Whether surfaces and lights may move then.
+    pub scene_moves: bool,
 }
 
 /// A scene on a device with a view of it: prepares techniques to run.
@@ -167,7 +167,7 @@ impl Renderer {
         self.check(technique)?;
         self.check_tessellation(technique)?;
         let recipe =
-            Recipe { technique, params: &completed(technique, params), moves: false, nodes_move: false };
+            Recipe { technique, params: &completed(technique, params), moves: false, scene_moves: false };
         self.prepare_recipe(&recipe, &self.settings, also)
     }
 
@@ -183,7 +183,7 @@ impl Renderer {
         camera: &Camera,
     ) -> Result<Prepared, TechniqueError> {
         let params = &completed(technique, params);
-        self.prepare_to_move(&Recipe { technique, params, moves: true, nodes_move: false }, camera)
+        self.prepare_to_move(&Recipe { technique, params, moves: true, scene_moves: false }, camera)
     }
 
     pub(crate) fn prepare_to_move(
@@ -205,7 +205,7 @@ impl Renderer {
     ) -> Result<Prepared, TechniqueError> {
         let mut capacities = Capacities::default();
         for _ in 1..RECORDINGS_MAX {
-            let mut prepared = self.record(recipe, settings, None, capacities, &also)?;
+            let mut prepared = self.record(recipe, settings, Moved::default(), capacities, &also)?;
             if !prepared.capacities.is_watched() {
                 return Ok(prepared);
             }
@@ -221,7 +221,7 @@ impl Renderer {
             }
         }
         // What it needs still grows: its counters tell what it drops.
-        self.record(recipe, settings, None, capacities, &also)
+        self.record(recipe, settings, Moved::default(), capacities, &also)
     }
 
     fn check(&self, technique: &dyn Technique) -> Result<(), TechniqueError> {
@@ -291,11 +291,11 @@ impl Renderer {
         &self,
         recipe: &Recipe<'_>,
         settings: &Settings,
-        moved: Option<Box<Placed>>,
+        moved: Moved,
         capacities: Capacities,
         also: &impl Fn(&mut Graph, &ImageHandle),
     ) -> Result<Prepared, TechniqueError> {
-        let Recipe { technique, params, moves, nodes_move } = *recipe;
+        let Recipe { technique, params, moves, scene_moves } = *recipe;
         let options = *params.typed::<DrawParams>();
         let viewed = Viewed::new(settings, self.scene.clone(), self.lights.clone(), moved, options);
         let view = viewed.view();
@@ -309,20 +309,21 @@ impl Renderer {
             samples: settings.samples,
             params,
             scene: &self.scene,
-            lights: &self.lights,
+            lights: view.lights,
             clip_from_world: view.camera.clip_from_world,
             eye_moved_m: view.camera.eye_moved_m,
             background_radiance: background_radiance(settings).into(),
             view: &settings.view,
             tessellate_px: settings.effects.tessellation.edge_px,
             displacement_m: settings.effects.tessellation.displacement_m(),
-            buffers: self.import(&mut graph, &inputs, nodes_move)?,
+            buffers: self.import(&mut graph, &inputs, scene_moves)?,
             shaders: &[&self.extra_shaders, technique.shaders(), &afterlight_stages::SHADERS],
             device: &self.device,
             capacities: &capacities,
             visible: view.visible,
             inputs: &inputs,
             moves,
+            scene_moves,
             board: Board::default(),
         };
         indirect::record(&mut graph, &mut frame, settings)?;
@@ -355,7 +356,7 @@ impl Renderer {
         Prepared::new(&self.device, executor, viewed, inputs, capacities, kept, draw_calls)
     }
 
-    /// Brings the scene into a graph; where it is `alive`, the records of its draws are inputs.
+    /// Brings the scene into a graph; where it is `alive`, the records of its draws and lights are inputs.
     fn import(
         &self,
         graph: &mut Graph,
@@ -383,6 +384,13 @@ impl Renderer {
                 graph.import_image("scene draw records", BufferRole::Scene, &s.draw_data, UPLOADED),
             ),
         };
+        let (lights, light_spheres) = match alive {
+            true => inputs.declare_lights(&self.device, graph, &self.lights)?,
+            false => (
+                graph.import_image("lights", BufferRole::Lights, &self.lights.data, UPLOADED),
+                graph.import_image("light spheres", BufferRole::Lights, &self.lights.spheres, UPLOADED),
+            ),
+        };
         Ok(SceneBuffers {
             frame: constants,
             draws: stream,
@@ -393,13 +401,8 @@ impl Renderer {
                 BufferRole::Scene,
                 &s.uv_transforms,
             ),
-            lights: graph.import_image("lights", BufferRole::Lights, &self.lights.data, UPLOADED),
-            light_spheres: graph.import_image(
-                "light spheres",
-                BufferRole::Lights,
-                &self.lights.spheres,
-                UPLOADED,
-            ),
+            lights,
+            light_spheres,
             positions: graph.import_buffer("scene positions", BufferRole::Scene, &s.positions),
             attributes: graph.import_buffer("scene attributes", BufferRole::Scene, &s.attributes),
             indices: graph.import_buffer("scene indices", BufferRole::Scene, &s.indices),

@@ -2,14 +2,16 @@
 
 mod common;
 
+use std::sync::Arc;
+
 use afterlight_image::Rgba8Image;
-use afterlight_renderer::{Done, Event, Flight, FlightOptions, FrameContext, Renderer, Shortfall};
+use afterlight_renderer::{Done, Event, Flight, FlightOptions, FrameContext, Renderer, ScenePose, Shortfall};
 use afterlight_techniques::{
-    Params, Technique, TechniqueError, find, registry,
-    scene::{Camera, Projection},
+    Indirect, Params, Settings, Shadows, Technique, TechniqueError, find, registry,
+    scene::{self, Camera, Light, Projection},
 };
 use common::{Stage, image_of, params, psnr};
-use glam::Vec3;
+use glam::{Affine3A, Vec3};
 
 const SIZE: (u32, u32) = (97, 55);
 /// Panes, foliage cards, drapes, and textures of every kind.
@@ -36,8 +38,21 @@ fn path(stage: &Stage, frames: u64) -> Vec<Camera> {
     (0..frames).map(at).collect()
 }
 
-/// Flies along cameras and returns pictures and events.
-fn flown(flight: &mut Flight<'_>, cameras: &[Camera]) -> (Vec<Rgba8Image>, Vec<Vec<Event>>) {
+/// Frames of a scene that stands still.
+fn still(cameras: &[Camera]) -> impl Iterator<Item = FrameContext> + '_ {
+    (0..).zip(cameras).map(|(index, camera)| FrameContext {
+        index,
+        time_s: 0.0,
+        camera: camera.clone(),
+        pose: None,
+    })
+}
+
+/// Flies and returns pictures and events.
+fn flown(
+    flight: &mut Flight<'_>,
+    contexts: impl IntoIterator<Item = FrameContext>,
+) -> (Vec<Rgba8Image>, Vec<Vec<Event>>) {
     let (mut pictures, mut events) = (Vec::new(), Vec::new());
     let mut done = |frame: &Done<'_>| -> Result<(), TechniqueError> {
         assert_eq!(frame.index, pictures.len() as u64, "frames come in their order");
@@ -47,8 +62,7 @@ fn flown(flight: &mut Flight<'_>, cameras: &[Camera]) -> (Vec<Rgba8Image>, Vec<V
         events.push(frame.events.to_vec());
         Ok(())
     };
-    for (index, camera) in (0..).zip(cameras) {
-        let context = FrameContext { index, time_s: 0.0, camera: camera.clone(), world_from_objects: None };
+    for context in contexts {
         flight.frame(context, &mut done).unwrap_or_else(|e| panic!("{e}"));
     }
     flight.land(&mut done).unwrap_or_else(|e| panic!("{e}"));
@@ -99,7 +113,7 @@ fn every_frame_is_the_picture_of_its_view() {
                 .fly(*technique, &Params::default(), &cameras[0], options())
                 .unwrap_or_else(|e| panic!("{id}: {e}"));
             assert!(flight.moves_without_plans(), "{id} at {samples} samples");
-            let (pictures, events) = flown(&mut flight, &cameras);
+            let (pictures, events) = flown(&mut flight, still(&cameras));
             assert!(!events.concat().contains(&Event::Planned), "{id} at {samples} samples");
             let alone = alone(&stage, *technique, &Params::default(), samples, &cameras);
             let off: Vec<_> =
@@ -142,7 +156,7 @@ fn a_view_that_needs_far_more_than_the_last_is_drawn_again_or_told() {
         let renderer = renderer.unwrap_or_else(|e| panic!("{e}"));
         let mut flight =
             renderer.fly(technique, &params, &nothing, options()).unwrap_or_else(|e| panic!("{id}: {e}"));
-        let (pictures, events) = flown(&mut flight, &cameras);
+        let (pictures, events) = flown(&mut flight, still(&cameras));
         let alone = alone(&stage, technique, &params, samples, &cameras);
         let off: Vec<_> =
             unlike(&pictures, &alone).into_iter().filter(|(_, db)| *db < UNORDERED_DB).collect();
@@ -160,11 +174,121 @@ fn a_view_that_needs_far_more_than_the_last_is_drawn_again_or_told() {
             Ok(())
         };
         for (index, camera) in (0..).zip(&cameras) {
-            let context =
-                FrameContext { index, time_s: 0.0, camera: camera.clone(), world_from_objects: None };
+            let context = FrameContext { index, time_s: 0.0, camera: camera.clone(), pose: None };
             flight.frame(context, &mut done).unwrap_or_else(|e| panic!("{id}: {e}"));
         }
         flight.land(&mut done).unwrap_or_else(|e| panic!("{id}: {e}"));
         assert_eq!((short[0], short[2], short[6]), (false, true, false), "{id}: {short:?}");
     }
+}
+
+/// Where surfaces and lights are in a frame: instances turn and rise, lights go around.
+fn pose_of(stage: &Stage, lights: &[Light], frame: u64) -> ScenePose {
+    let t = frame as f32;
+    let moved = |(i, instance): (usize, &scene::Instance)| {
+        let turn = Affine3A::from_rotation_y(0.15 * t * (i % 3) as f32);
+        let rise = Affine3A::from_translation(Vec3::Y * 0.2 * t * (i % 2) as f32);
+        rise * instance.world_from_object * turn
+    };
+    let center = stage.scene.bounds_ws().center();
+    let around = Affine3A::from_translation(center)
+        * Affine3A::from_rotation_y(0.9 * t)
+        * Affine3A::from_translation(-center);
+    ScenePose {
+        world_from_objects: stage.scene.instances.iter().enumerate().map(moved).collect(),
+        lights: Some(
+            lights
+                .iter()
+                .map(|light| Light { position_ws: around.transform_point3(light.position_ws), ..*light })
+                .collect(),
+        ),
+    }
+}
+
+/// Frames of a scene that moves are what that scene is, uploaded as it stands: surfaces, panes, lights, the shadows of one of them and what it
+/// lights indirectly.
+#[test]
+fn every_frame_of_a_scene_that_moves_is_the_picture_of_its_pose() {
+    const FRAMES: u64 = 4;
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=20000&texture=64");
+    let camera = stage.scene.cameras.first().expect("a camera").clone();
+    let settings = stage.from(camera.clone(), SIZE, LIGHTS).with_effects(|effects| {
+        (effects.shadows.method, effects.shadows.map_size_px) = (Shadows::Map, 256);
+        (effects.indirect.method, effects.indirect.map_size_px) = (Indirect::Rsm, 64);
+    });
+    let poses: Vec<Arc<ScenePose>> =
+        (0..FRAMES).map(|frame| Arc::new(pose_of(&stage, &settings.lights, frame))).collect();
+    let posed: Vec<Stage> = poses
+        .iter()
+        .map(|pose| {
+            let mut scene = stage.scene.clone();
+            for (instance, world_from_object) in scene.instances.iter_mut().zip(&pose.world_from_objects) {
+                instance.world_from_object = *world_from_object;
+            }
+            Stage::of(&gpu, scene)
+        })
+        .collect();
+    let options = FlightOptions { scene_moves: true, ..options() };
+    for technique in registry() {
+        let samples = if technique.info().samples.contains(&4) { 4 } else { 1 };
+        let id = technique.info().id;
+        let settings = Settings { samples, ..settings.clone() };
+        let renderer = Renderer::with_scene(&stage.device, stage.uploaded.clone(), &settings);
+        let renderer = renderer.unwrap_or_else(|e| panic!("{e}"));
+        let mut flight = renderer
+            .fly(*technique, &Params::default(), &camera, options)
+            .unwrap_or_else(|e| panic!("{id}: {e}"));
+        let contexts = (0..).zip(&poses).map(|(index, pose)| FrameContext {
+            index,
+            time_s: index as f64,
+            camera: camera.clone(),
+            pose: Some(pose.clone()),
+        });
+        let (pictures, _) = flown(&mut flight, contexts);
+        let of_pose = |(stage, pose): (&Stage, &Arc<ScenePose>)| {
+            let lights = pose.lights.clone().expect("they move");
+            let mut prepared = stage.prepare(*technique, &Settings { lights, ..settings.clone() });
+            image_of(&mut prepared)
+        };
+        let alone: Vec<Rgba8Image> = posed.iter().zip(&poses).map(of_pose).collect();
+        let off: Vec<_> =
+            unlike(&pictures, &alone).into_iter().filter(|(_, db)| *db < UNORDERED_DB).collect();
+        assert!(off.is_empty(), "{id} at {samples} samples: frames and dB {off:?}");
+        // The mutant: every frame in the pose of the frame before.
+        let mut late = pictures.clone();
+        late.rotate_right(1);
+        assert_eq!(unlike(&late, &alone).len(), poses.len(), "{id}: the poses show too little");
+    }
+}
+
+#[test]
+fn poses_that_do_not_fit_a_flight_are_told() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:intersect");
+    let settings = stage.settings(SIZE, 3);
+    let renderer = Renderer::with_scene(&stage.device, stage.uploaded.clone(), &settings);
+    let renderer = renderer.unwrap_or_else(|e| panic!("{e}"));
+    let told = |scene_moves: bool, pose: ScenePose| {
+        let options = FlightOptions { scene_moves, ..FlightOptions::default() };
+        let technique = find("visibility").expect("known");
+        let mut flight = renderer
+            .fly(technique, &Params::default(), &settings.camera, options)
+            .unwrap_or_else(|e| panic!("{e}"));
+        let context = FrameContext {
+            index: 0,
+            time_s: 0.0,
+            camera: settings.camera.clone(),
+            pose: Some(Arc::new(pose)),
+        };
+        flight.frame(context, &mut |_| Ok(())).expect_err("is refused").to_string()
+    };
+    let good = pose_of(&stage, &settings.lights, 1);
+    assert!(told(false, good.clone()).contains("scene_moves"));
+    let fewer = ScenePose { lights: Some(settings.lights[1..].to_vec()), ..good.clone() };
+    assert!(told(true, fewer).contains("than the 3"));
+    let mut mirrored = good;
+    mirrored.world_from_objects[0] =
+        mirrored.world_from_objects[0] * Affine3A::from_scale(Vec3::new(-1.0, 1.0, 1.0));
+    assert!(told(true, mirrored).contains("instance 0"));
 }

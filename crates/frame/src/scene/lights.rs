@@ -5,7 +5,7 @@ use afterlight_scene::{Aabb, Light, LightKind};
 use afterlight_shader::structs::LightData;
 use glam::Vec3;
 
-use crate::scene::record_image;
+use crate::{put, scene::record_image};
 
 /// Lights on the device: those without an end first, so that techniques with light volumes can tell them apart, the others along
 /// a curve that keeps neighbours together (`lights/bvh/`).
@@ -52,6 +52,37 @@ impl SceneLights {
             only_points: lights.iter().all(|l| l.kind == LightKind::Point),
             lights,
         })
+    }
+
+    /// The same images for lights that have moved, in [`device_order`]; their records must be written anew ([`Self::fill_data`],
+    /// [`Self::fill_spheres`]). `None` where they are not as many, or of other kinds: what is recorded for the old ones does not fit them.
+    pub fn moved(&self, lights: &[Light]) -> Option<Self> {
+        let lights = device_order(lights);
+        let unbounded = lights.iter().filter(|light| is_unbounded(light)).count() as u32;
+        let only_points = lights.iter().all(|l| l.kind == LightKind::Point);
+        let fits = lights.len() as u32 == self.count
+            && unbounded == self.unbounded_count
+            && only_points == self.only_points;
+        let Self { data, spheres, count, unbounded_count, .. } = self;
+        let (data, spheres) = (data.clone(), spheres.clone());
+        fits.then_some(Self {
+            data,
+            spheres,
+            count: *count,
+            unbounded_count: *unbounded_count,
+            only_points,
+            lights,
+        })
+    }
+
+    /// Writes the records of [`Self::data`], as long as that image.
+    pub fn fill_data(&self, bytes: &mut [u8]) {
+        self.lights.iter().enumerate().for_each(|(i, light)| put(bytes, 64 * i, &[light_data(light)]));
+    }
+
+    /// Writes the spheres of [`Self::spheres`], as long as that image.
+    pub fn fill_spheres(&self, bytes: &mut [u8]) {
+        self.lights.iter().enumerate().for_each(|(i, light)| put(bytes, 16 * i, &[bounding_sphere(light)]));
     }
 
     /// Number of lights with an end.

@@ -15,7 +15,7 @@ use glam::Vec3;
 use afterlight_cost::{Cost, Workload};
 use afterlight_frame::{
     Answers, AppendixA, Exactness, Frame, Info, OpaqueDepth, Params, Source, Technique, TechniqueError, View,
-    camera_view::screen_rect, scene::BUCKETS,
+    camera_view::screen_rect,
 };
 use afterlight_shader::Shader;
 use afterlight_stages::surfaces::{depth_first::FIRST_FRAGMENT, geometry::SceneDraws};
@@ -116,9 +116,7 @@ fn draw_lights(frame: &Frame<'_>, pass: &mut RasterPass<'_>) -> Result<(), Techn
             .blend(vec![Blend::ADD]);
     surfaces.push = bytemuck::bytes_of(&0u32).to_vec();
     surfaces.draw(frame, pass);
-    let buckets = (0..BUCKETS)
-        .filter(|b| frame.scene.bucket_first[*b] < frame.scene.bucket_first[b + 1])
-        .count() as u32;
+    let buckets = surfaces.draw_count(frame);
     let by_light = frame.params.typed::<ForwardMultipassParams>().scissor == Scissor::Light;
     frame.script_of_view(pass, move |view| {
         let mut steps = Vec::new();

@@ -5,7 +5,7 @@
 
 use std::f32::consts::{PI, TAU};
 
-use afterlight_graph::{BufferHandle, BufferRole, Graph, ImageHandle, ImageInfo, Load, PassRole, gpu::vk};
+use afterlight_graph::{BufferHandle, BufferRole, Graph, ImageHandle, ImageInfo, Load, PassRole, Step, gpu::vk};
 use afterlight_shader::structs::RsmConstants;
 
 use crate::{shared::light_view, surfaces::geometry::SceneDraws};
@@ -140,6 +140,17 @@ fn raster(
     };
     let _depth = pass.depth(depth, Load::Clear(0.0));
     surfaces.draw(frame, &mut pass);
+    if frame.scene_moves {
+        // Lights that move have other numbers from frame to frame.
+        let draws = surfaces.draw_count(frame);
+        frame.script_of_view(&mut pass, move |view| {
+            let light_index = light_view::source(view).map(|source| view.lights.index_of(&source.light));
+            let push = light_index.or(Some(0));
+            let again =
+                |draw| Step::Draw { draw, scissor: None, stencil_reference: None, push, commands: None };
+            (0..draws).map(again).collect()
+        });
+    }
     pass.finish();
     Ok(images)
 }

@@ -217,6 +217,11 @@ impl SceneDraws {
         }
     }
 
+    /// Number of draws that [`Self::draw`] declares: one for each bucket that the scene has.
+    pub fn draw_count(&self, frame: &Frame<'_>) -> u32 {
+        frame.scene.bucket_first.windows(2).filter(|ends| ends[0] < ends[1]).count() as u32
+    }
+
     /// Adds some of the draws in view to a pass: a bucket's, by their places in its order. Word `word` of `counts` is their number:
     /// lavapipe (Mesa 22.3) gives an indirect call without a count the count of the call before.
     pub fn draw_some(
