@@ -148,10 +148,10 @@ pub struct PlayArgs {
     /// Techniques, by their ids; the first draws all frames, unless they take turns (--switch-every)
     #[arg(long, value_name = "ID,ID…", value_delimiter = ',', required = true)]
     pub technique: Vec<String>,
-    /// Camera path, a JSON file [default: a fly-through of the scene]
-    #[arg(long, value_name = "FILE")]
-    pub path: Option<PathBuf>,
-    /// Time that the path takes, seconds [default: that of all frames]
+    /// Camera path: a name, or a JSON file [default: the scene's first, or a fly-through]
+    #[arg(long, value_name = "NAME|FILE.json")]
+    pub path: Option<String>,
+    /// Time that the path takes, seconds [default: its own]
     #[arg(long, value_name = "SECONDS", value_parser = above_zero)]
     pub path_seconds: Option<f64>,
     /// Frames

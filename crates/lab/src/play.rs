@@ -3,8 +3,11 @@
 use afterlight_measure::{
     CapacityEvent, Distribution, HITCH_FACTOR, Hitch, Play, PlayMemory, Played, SCHEMA, Spread,
 };
-use afterlight_renderer::{Done, Event, Flight, FlightOptions, FrameContext, Shortfall};
+use std::sync::Arc;
+
+use afterlight_renderer::{Done, Event, Flight, FlightOptions, FrameContext, ScenePose, Shortfall};
 use afterlight_scene::camera::CameraPath;
+use afterlight_scene::{Camera, Moment, Pose, Scene};
 
 use crate::{Chosen, FrameSpec, LabError, Listener, Session, spec::check};
 
@@ -21,7 +24,7 @@ pub struct PlaySpec {
     pub frames: u64,
     /// Frames a second of the scene's time, above 0.
     pub fps: f64,
-    /// Time that the path takes from its first keyframe to its last, seconds; the time of all frames where none is given.
+    /// Time that the path takes, seconds; its own where none is given.
     pub path_s: Option<f64>,
     /// Frames on their way at once, 1 to 8.
     pub in_flight: u32,
@@ -45,12 +48,22 @@ impl PlaySpec {
         Ok(())
     }
 
-    /// Place on the path of a frame, 0 to 1. A path that is longer than the frames is flown in part, a shorter one again and again.
-    fn place(&self, frame: u64) -> f32 {
-        let time_s = frame as f64 / self.fps;
-        let path_s = self.path_s.unwrap_or_else(|| self.frames.saturating_sub(1).max(1) as f64 / self.fps);
-        let rounds = time_s / path_s;
-        (if rounds > 1.0 { rounds.fract() } else { rounds }) as f32
+    /// Time of the scene in a frame, seconds.
+    fn time_s(&self, frame: u64) -> f64 {
+        frame as f64 / self.fps
+    }
+
+    /// Place of a frame on a path that takes `path_s` seconds, 0 to 1. A path that is longer than the frames is flown in part; of a shorter one the
+    /// end holds, unless it is `closed` and begins anew.
+    fn place(&self, frame: u64, path_s: f64, closed: bool) -> f32 {
+        let path_s = self.path_s.unwrap_or(path_s);
+        let rounds = if path_s > 0.0 { self.time_s(frame) / path_s } else { 0.0 };
+        (if closed && rounds > 1.0 { rounds.fract() } else { rounds.min(1.0) }) as f32
+    }
+
+    /// The camera of a frame.
+    fn camera(&self, path: &CameraPath, frame: u64) -> Camera {
+        path.at(self.place(frame, path.duration_s(), path.closed))
     }
 }
 
@@ -68,12 +81,13 @@ struct Seen {
     fell_short: bool,
 }
 
-/// Plays a path with one technique after another. `sees` gets every picture, where there is one who wants them.
+/// Plays a path through a scene that plays its first animation, with one technique after another. `sees` gets every picture, where there is one
+/// who wants them. Skins and morph targets stay in the pose that the scene was loaded in, which a warning tells.
 ///
 /// # Errors
-/// A technique that cannot draw these frames, the device, those of `sees`.
+/// A technique that cannot draw these frames, a motion that mirrors an instance, the device, those of `sees`.
 pub fn play(
-    session: &Session,
+    (session, scene): (&Session, &Scene),
     spec: &FrameSpec,
     (path, how): (&CameraPath, &PlaySpec),
     chosen: &[Chosen],
@@ -81,13 +95,17 @@ pub fn play(
     listener: &dyn Listener,
 ) -> Result<Play, LabError> {
     how.check()?;
+    let mut poses = Poses::of(scene, spec);
     let options = FlightOptions {
         in_flight: how.in_flight,
         shortfall: Shortfall::DrawAgain,
         pictures: sees.is_some(),
-        scene_moves: false,
+        scene_moves: poses.is_some(),
     };
-    let first = path.at(how.place(0));
+    let first = how.camera(path, 0);
+    if poses.is_some() && !scene.deformations.is_empty() {
+        listener.warn("skins and morph targets: found some that may move, expected none; they stay in the pose of --time");
+    }
     let task = listener.task("preparing", chosen.len() as u64);
     let mut flights = Vec::with_capacity(chosen.len());
     for one in chosen {
@@ -103,6 +121,8 @@ pub fn play(
     for frame in 0..=how.frames {
         let is_over = frame == how.frames;
         let turn = how.switch_every.map_or(0, |every| frame / u64::from(every)) as usize % flights.len();
+        let time_s = how.time_s(frame);
+        let pose = poses.as_mut().filter(|_| !is_over).map(|poses| poses.at(time_s));
         for (technique, flight) in flights.iter_mut().enumerate() {
             let mut done = |done: &Done<'_>| {
                 seen[done.index as usize] = Some(Seen::of(technique, done));
@@ -117,9 +137,9 @@ pub fn play(
             match (is_over, technique == turn) {
                 (true, _) => flight.land(&mut done)?,
                 (false, true) => {
-                    let camera = path.at(how.place(frame));
+                    let camera = how.camera(path, frame);
                     flight.frame(
-                        FrameContext { index: frame, time_s: frame as f64 / how.fps, camera, pose: None },
+                        FrameContext { index: frame, time_s, camera, pose: pose.clone() },
                         &mut done,
                     )?;
                 }
@@ -133,6 +153,34 @@ pub fn play(
     drop(task);
     let seen: Vec<Seen> = seen.into_iter().flatten().collect();
     Ok(record(session, spec, (path, how), (chosen, &flights), &seen))
+}
+
+/// Poses of a scene whose first animation plays.
+struct Poses<'a> {
+    scene: &'a Scene,
+    pose: Pose,
+    lights_move: bool,
+}
+
+impl<'a> Poses<'a> {
+    /// `None` where nothing moves: without an animation, or where a time is fixed.
+    fn of(scene: &'a Scene, spec: &FrameSpec) -> Option<Self> {
+        // Seeded lights stand still.
+        let lights_move = spec.lights == 0 && !scene.light_nodes.is_empty();
+        (!scene.animations.is_empty() && spec.time_s.is_none()).then(|| Self {
+            scene,
+            pose: Pose::default(),
+            lights_move,
+        })
+    }
+
+    fn at(&mut self, time_s: f64) -> Arc<ScenePose> {
+        self.scene.pose_into(Moment::at(time_s), &mut self.pose);
+        Arc::new(ScenePose {
+            world_from_objects: self.pose.world_from_object.clone(),
+            lights: self.lights_move.then(|| self.pose.lights.clone()),
+        })
+    }
 }
 
 impl Seen {
@@ -317,11 +365,13 @@ mod tests {
     }
 
     #[test]
-    fn places_run_along_the_path_and_begin_anew() {
+    fn places_run_along_the_path() {
         let how = PlaySpec { frames: 11, fps: 10.0, path_s: None, in_flight: 3, switch_every: None };
-        assert_eq!((how.place(0), how.place(5), how.place(10)), (0.0, 0.5, 1.0));
-        let how = PlaySpec { path_s: Some(0.5), ..how };
-        assert_eq!((how.place(5), how.place(10)), (1.0, 0.0));
-        assert!((how.place(6) - 0.2).abs() < 1e-6);
+        assert_eq!([0, 5, 10].map(|frame| how.place(frame, 1.0, false)), [0.0, 0.5, 1.0]);
+        assert_eq!([5, 10].map(|frame| how.place(frame, 0.5, false)), [1.0, 1.0], "the end holds");
+        assert!((how.place(6, 0.5, true) - 0.2).abs() < 1e-6, "a closed path begins anew");
+        assert_eq!(how.place(7, 0.0, false), 0.0, "a path of one keyframe");
+        let slower = PlaySpec { path_s: Some(2.0), ..how };
+        assert_eq!(slower.place(10, 1.0, false), 0.5);
     }
 }

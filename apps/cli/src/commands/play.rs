@@ -10,6 +10,8 @@ use afterlight_measure::{Distribution, Play};
 use afterlight_report::check_file;
 use afterlight_report::text::{grouped, table};
 
+use afterlight_scene::camera::CameraPath;
+
 use crate::args::PlayArgs;
 use crate::failure::Failure;
 use crate::output;
@@ -20,7 +22,7 @@ pub fn run(args: &PlayArgs) -> Result<(), Failure> {
     if let Some(path) = args.json.json.as_deref().filter(|_| !args.json.on_stdout()) {
         check_file(path)?;
     }
-    let mut spec = args.common.spec()?;
+    let spec = args.common.spec()?;
     let how = PlaySpec {
         frames: args.frames,
         fps: args.fps,
@@ -35,7 +37,8 @@ pub fn run(args: &PlayArgs) -> Result<(), Failure> {
     }
     let chosen = choose("technique", &args.technique, &spec.set)?;
     let terminal = Terminal::new(args.common.quiet, Some(&args.json), false);
-    let (session, path) = Session::open_along(&args.scene, &mut spec, args.path.as_deref(), &terminal)?;
+    let (session, scene) = Session::open_with_scene(&args.scene, &spec, &terminal)?;
+    let path = CameraPath::select(&scene, args.path.as_deref())?;
     super::tell_warnings(&session, &terminal);
     let mut write = |frame: u64, rgba8: &[u8]| {
         let Some(pattern) = &pattern else { return Ok(()) };
@@ -43,7 +46,7 @@ pub fn run(args: &PlayArgs) -> Result<(), Failure> {
         Ok(write_png(&pattern.file(frame), &image)?)
     };
     let sees = pattern.is_some().then_some(&mut write as &mut SeesPicture<'_>);
-    let played = play(&session, &spec, (&path, &how), &chosen, sees, &terminal)?;
+    let played = play((&session, &scene), &spec, (&path, &how), &chosen, sees, &terminal)?;
     output::json(&args.json, &played)?;
     terminal.tell(&text(&played));
     session.finish(&spec, &terminal)?;
