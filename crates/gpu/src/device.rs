@@ -12,6 +12,7 @@ use ash::{ext, khr, vk};
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use std::ffi::CString;
 use std::path::PathBuf;
+use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// How to open a device.
@@ -47,6 +48,8 @@ pub(crate) struct DeviceInner {
     queue: Mutex<Queue>,
     /// Counts submissions: its value is the number of the last one that is done, and all before it are.
     timeline: vk::Semaphore,
+    /// Bytes that resources and heaps hold, see [`Device::held_bytes`].
+    pub held_bytes: AtomicU64,
     /// `None` only while the device is being dropped.
     allocator: Mutex<Option<Allocator>>,
     pub set_layouts: SetLayoutCache,
@@ -153,6 +156,7 @@ impl Device {
             without_float_stencil: options.without_float_stencil,
             queue: Mutex::new(Queue { raw: queue, submitted: 0 }),
             timeline,
+            held_bytes: AtomicU64::new(0),
             allocator: Mutex::new(Some(allocator)),
             set_layouts: SetLayoutCache::default(),
             pipelines,
@@ -234,11 +238,7 @@ impl Device {
     }
 
     fn encoder_for(&self, how_often: vk::CommandBufferUsageFlags) -> Result<Encoder, GpuError> {
-        let idle = lock(&self.0.recorders).pop();
-        let recorder = match idle {
-            Some(recorder) => recorder,
-            None => Recorder::new(self)?,
-        };
+        let recorder = self.recorder()?;
         Encoder::new(self.clone(), recorder, how_often)
     }
 
@@ -253,6 +253,12 @@ impl Device {
         let mut completed = Completed::default();
         recording.collect(&mut completed)?;
         Ok(completed)
+    }
+
+    /// One that nobody uses at the moment, or a new one.
+    pub(crate) fn recorder(&self) -> Result<Recorder, GpuError> {
+        let idle = lock(&self.0.recorders).pop();
+        idle.map_or_else(|| Recorder::new(self), Ok)
     }
 
     pub(crate) fn give_back(&self, recorder: Recorder) {

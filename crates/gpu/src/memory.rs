@@ -5,6 +5,7 @@ use crate::{Device, GpuError, ImageDesc};
 use ash::vk;
 use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
 use gpu_allocator::{AllocationError, MemoryLocation};
+use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 
 /// Where a buffer lies and who reaches it.
@@ -61,6 +62,7 @@ impl Memory {
         if let Memory::Own(allocation) = self
             && let Some(allocation) = allocation.take()
         {
+            device.0.held_bytes.fetch_sub(allocation.size(), Ordering::Relaxed);
             // The allocator refuses only what it did not give; there is nobody to tell in a drop.
             let _ = device.with_allocator(|a| a.free(allocation));
         }
@@ -130,6 +132,7 @@ impl Heap {
 
 impl Drop for HeapInner {
     fn drop(&mut self) {
+        self.device.0.held_bytes.fetch_sub(self.bytes, Ordering::Relaxed);
         // SAFETY: every resource in the heap holds it, so none is left.
         unsafe { self.device.0.raw.free_memory(self.raw, None) };
     }
@@ -374,6 +377,7 @@ impl Device {
             bytes,
         ))?;
         self.set_name(raw, name);
+        self.0.held_bytes.fetch_add(bytes, Ordering::Relaxed);
         Ok(Heap(Arc::new(HeapInner { device: self.clone(), raw, name: name.to_owned(), bytes, type_index })))
     }
 
@@ -387,6 +391,11 @@ impl Device {
         let mut candidates = (0..types.len()).filter(among);
         let found = candidates.clone().find(|i| local(i) && hidden(i));
         found.or_else(|| candidates.clone().find(local)).or_else(|| candidates.next()).map(|i| i as u32)
+    }
+
+    /// Bytes that buffers, images and heaps of this device hold at the moment, as they asked for them; an allocator's unused room is left out.
+    pub fn held_bytes(&self) -> u64 {
+        self.0.held_bytes.load(Ordering::Relaxed)
     }
 
     /// Takes memory for a resource from the allocator.
@@ -409,7 +418,11 @@ impl Device {
             linear: is_linear,
             allocation_scheme: AllocationScheme::GpuAllocatorManaged,
         };
-        self.with_allocator(|a| a.allocate(&desc)).map_err(|error| match error {
+        let allocated = self.with_allocator(|a| a.allocate(&desc));
+        if let Ok(allocation) = &allocated {
+            self.0.held_bytes.fetch_add(allocation.size(), Ordering::Relaxed);
+        }
+        allocated.map_err(|error| match error {
             AllocationError::OutOfMemory => {
                 GpuError::OutOfMemory { resource: name.to_owned(), bytes: needs.size }
             }

@@ -286,7 +286,7 @@ impl Uploader {
                 usage: vk::BufferUsageFlags::TRANSFER_SRC,
                 memory: MemoryKind::Upload,
             })?;
-            let recorder = Recorder::new(&self.device)?;
+            let recorder = self.device.recorder()?;
             self.parts.push(Part {
                 recorder: Some(recorder),
                 staging,

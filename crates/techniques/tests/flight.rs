@@ -292,3 +292,36 @@ fn poses_that_do_not_fit_a_flight_are_told() {
         mirrored.world_from_objects[0] * Affine3A::from_scale(Vec3::new(-1.0, 1.0, 1.0));
     assert!(told(true, mirrored).contains("instance 0"));
 }
+
+/// Flights of other techniques, sizes and samples, one after another: the device holds as much after each round as after the round before.
+#[test]
+fn flights_give_back_what_they_held() {
+    const ROUNDS: usize = 5;
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=20000&texture=64");
+    let cameras = path(&stage, 20);
+    let mut held_bytes = Vec::new();
+    for _ in 0..ROUNDS {
+        for (id, samples, size) in [
+            ("visibility", 1, SIZE),
+            ("clustered-forward", 4, (64, 36)),
+            ("dais", 4, (97, 36)),
+            ("deferred", 1, (33, 19)),
+        ] {
+            let mut settings = stage.from(cameras[0].clone(), size, LIGHTS);
+            settings.samples = samples;
+            let renderer = Renderer::with_scene(&stage.device, stage.uploaded.clone(), &settings);
+            let renderer = renderer.unwrap_or_else(|e| panic!("{e}"));
+            let technique = find(id).expect("known");
+            let mut flight = renderer
+                .fly(technique, &Params::default(), &cameras[0], FlightOptions::default())
+                .unwrap_or_else(|e| panic!("{id}: {e}"));
+            for context in still(&cameras) {
+                flight.frame(context, &mut |_| Ok(())).unwrap_or_else(|e| panic!("{id}: {e}"));
+            }
+            // Dropped with frames on their way.
+        }
+        held_bytes.push(gpu.held_bytes());
+    }
+    assert_eq!(held_bytes[1..], [held_bytes[1]; ROUNDS - 1], "{held_bytes:?}");
+}
