@@ -873,7 +873,8 @@ fn play_tells_how_steady_frames_are() {
     let played = json(&output);
     assert_eq!(played["schema"], 1);
     let techniques = played["techniques"].as_array().expect("a list");
-    let frames: Vec<_> = techniques.iter().map(|one| (one["technique"].clone(), one["frames"].clone())).collect();
+    let frames: Vec<_> =
+        techniques.iter().map(|one| (one["technique"].clone(), one["frames"].clone())).collect();
     assert_eq!(frames, [("tiled".into(), 6.into()), ("visibility".into(), 3.into())]);
     for one in techniques {
         assert_eq!(one["moves_without_plans"], true);

@@ -19,6 +19,7 @@ use crate::{
         draw_list::{COMMAND_BYTES, write_commands, write_counts},
         placed::Placed,
     },
+    upload::put,
 };
 
 /// A view of the scene, from which the inputs of a frame are computed.
@@ -306,14 +307,5 @@ impl Frame<'_> {
     /// anew, which costs the time of a plan.
     pub fn holds_for_this_view(&self) {
         self.inputs.holds_for_one_view.set(true);
-    }
-}
-
-/// Writes values from `offset` bytes on; what finds no room is left out.
-pub fn put<T: bytemuck::NoUninit>(bytes: &mut [u8], offset: usize, values: &[T]) {
-    let from: &[u8] = bytemuck::cast_slice(values);
-    if let Some(to) = bytes.get_mut(offset..) {
-        let count = from.len().min(to.len());
-        to[..count].copy_from_slice(&from[..count]);
     }
 }

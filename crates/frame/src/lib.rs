@@ -34,7 +34,7 @@ pub use effects::{
 };
 pub use error::TechniqueError;
 pub use frame::{DrawCommands, Frame, SceneBuffers};
-pub use inputs::{ChangesWith, View, ViewInput, ViewInputs, ViewScript, put};
+pub use inputs::{ChangesWith, View, ViewInput, ViewInputs, ViewScript};
 pub use params::{ParamError, ParamInfo, ParamKind, ParamSet, Params};
 pub use scene::{
     SceneGpu,
@@ -46,4 +46,5 @@ pub use technique::{
     ANY_SAMPLES, Answers, AppendixA, Approximation, Condition, Exactness, Info, MULTIPLE_SAMPLES, Need,
     Source, Technique, completed, exactness_of, params_of, set_param,
 };
+pub use upload::put;
 pub use views::LightPairs;

@@ -25,6 +25,15 @@ pub fn upload_slice<T: bytemuck::NoUninit>(
     Ok(buffer)
 }
 
+/// Writes values from `offset` bytes on; what finds no room is left out.
+pub fn put<T: bytemuck::NoUninit>(bytes: &mut [u8], offset: usize, values: &[T]) {
+    let from: &[u8] = bytemuck::cast_slice(values);
+    if let Some(to) = bytes.get_mut(offset..) {
+        let count = from.len().min(to.len());
+        to[..count].copy_from_slice(&from[..count]);
+    }
+}
+
 /// Texels of a row of a record image: shaders address rows of this length.
 const ROW_TEXELS: usize = 1024;
 

@@ -110,7 +110,8 @@ impl Viewed {
     fn choose_draws(&mut self) {
         let placed = self.moved.placed.as_deref().unwrap_or(&self.scene.rest);
         let displacement_m = self.settings.effects.tessellation.displacement_m();
-        self.draws.update(&self.scene, &placed.infos, &self.camera, displacement_m);
+        let from = (self.camera.clip_from_world, self.camera.eye_ws);
+        self.draws.update(&self.scene, &placed.infos, from, displacement_m);
     }
 
     pub fn view(&self) -> View<'_> {

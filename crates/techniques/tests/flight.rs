@@ -288,8 +288,7 @@ fn poses_that_do_not_fit_a_flight_are_told() {
     let fewer = ScenePose { lights: Some(settings.lights[1..].to_vec()), ..good.clone() };
     assert!(told(true, fewer).contains("than the 3"));
     let mut mirrored = good;
-    mirrored.world_from_objects[0] =
-        mirrored.world_from_objects[0] * Affine3A::from_scale(Vec3::new(-1.0, 1.0, 1.0));
+    mirrored.world_from_objects[0] *= Affine3A::from_scale(Vec3::new(-1.0, 1.0, 1.0));
     assert!(told(true, mirrored).contains("instance 0"));
 }
 

@@ -6,8 +6,9 @@ use afterlight_scene::Aabb;
 use glam::{Mat4, Vec3, Vec4};
 
 use crate::{
-    CameraView, Cull, DrawOrder, DrawParams, put,
+    Cull, DrawOrder, DrawParams,
     scene::{BUCKETS, DrawInfo, SceneGpu},
+    upload::put,
 };
 
 /// `VkDrawIndexedIndirectCommand`.
@@ -47,8 +48,14 @@ impl DrawChoice {
     }
 
     /// Chooses and orders the draws for a view, which stand where `infos` says; surfaces may be displaced by `displacement_m` along each axis.
-    pub fn update(&mut self, scene: &SceneGpu, infos: &[DrawInfo], view: &CameraView, displacement_m: f32) {
-        let frustum = Frustum::new(view.clip_from_world);
+    pub fn update(
+        &mut self,
+        scene: &SceneGpu,
+        infos: &[DrawInfo],
+        (clip_from_world, eye_ws): (Mat4, Vec3),
+        displacement_m: f32,
+    ) {
+        let frustum = Frustum::new(clip_from_world);
         let Self { options, visible, keyed } = self;
         for (bucket, visible) in visible.iter_mut().enumerate() {
             let (first, end) = (scene.bucket_first[bucket], scene.bucket_first[bucket + 1]);
@@ -60,7 +67,7 @@ impl DrawChoice {
             keyed.extend(
                 (first..end)
                     .filter(in_view)
-                    .map(|draw| (options.order.key(&infos[draw as usize].bounds_ws, view.eye_ws), draw)),
+                    .map(|draw| (options.order.key(&infos[draw as usize].bounds_ws, eye_ws), draw)),
             );
             if options.order != DrawOrder::Scene {
                 // Draws of one distance keep the scene's order, so that equal depths resolve alike in every technique.

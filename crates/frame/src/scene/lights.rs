@@ -5,7 +5,7 @@ use afterlight_scene::{Aabb, Light, LightKind};
 use afterlight_shader::structs::LightData;
 use glam::Vec3;
 
-use crate::{put, scene::record_image};
+use crate::upload::{put, record_image};
 
 /// Lights on the device: those without an end first, so that techniques with light volumes can tell them apart, the others along
 /// a curve that keeps neighbours together (`lights/bvh/`).

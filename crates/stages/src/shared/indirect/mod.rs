@@ -5,7 +5,9 @@
 
 use std::f32::consts::{PI, TAU};
 
-use afterlight_graph::{BufferHandle, BufferRole, Graph, ImageHandle, ImageInfo, Load, PassRole, Step, gpu::vk};
+use afterlight_graph::{
+    BufferHandle, BufferRole, Graph, ImageHandle, ImageInfo, Load, PassRole, Step, gpu::vk,
+};
 use afterlight_shader::structs::RsmConstants;
 
 use crate::{shared::light_view, surfaces::geometry::SceneDraws};

@@ -153,7 +153,8 @@ pub fn look_through<T>(
     let draws = frame.inputs.declare_draws(frame.device, graph, named, frame.scene, move |view| {
         let mut choice = DrawChoice::new(DrawParams::default());
         if let Some((_, camera)) = through(view, size_px) {
-            choice.update(view.scene, &view.placed.infos, &camera, view.displacement_m());
+            let from = (camera.clip_from_world, camera.eye_ws);
+            choice.update(view.scene, &view.placed.infos, from, view.displacement_m());
         }
         Cow::Owned(choice.visible)
     })?;
