@@ -69,7 +69,7 @@ pub struct FrameContext {
 pub struct ScenePose {
     /// World from object of each instance of the scene.
     pub world_from_objects: Vec<Affine3A>,
-    /// The lights, as many and of the same kinds as the renderer's; `None` leaves them.
+    /// The lights, as many and of the same kinds as the renderer's; `None` is those.
     pub lights: Option<Vec<Light>>,
 }
 
@@ -237,7 +237,7 @@ impl Flight<'_> {
         if context.pose.is_some() && !self.options.scene_moves {
             return Err(TechniqueError::SceneStandsStill);
         }
-        self.prepared.viewed.place(context.pose.as_deref())?;
+        self.prepared.viewed.place(context.pose.as_deref(), &self.renderer.settings().lights)?;
         self.prepared.viewed.look_through(&context.camera);
         Ok(())
     }
@@ -316,9 +316,7 @@ impl Flight<'_> {
             let Some(mut place) = self.places.remove(oldest) else { return Ok(()) };
             let Some(mut flying) = place.flying.take() else { return Ok(()) };
             place.slot.finish()?;
-            let start = Instant::now();
             let fell_short = self.make_room(&mut place, &mut flying)?;
-            flying.cpu += start.elapsed();
             let times = place.slot.finish()?.clone();
             let picture = self.options.pictures.then_some(place.demands.len());
             let mut tell = |rgba8: Option<&[u8]>| {
@@ -345,6 +343,7 @@ impl Flight<'_> {
     /// and the options say so. Returns whether the frame that `place` now holds dropped something.
     fn make_room(&mut self, place: &mut Place, flying: &mut Flying) -> Result<bool, TechniqueError> {
         for again in 0..=DRAWN_AGAIN_MAX {
+            let start = Instant::now();
             let shortages = place.shortages()?;
             let fell_short = shortages.iter().any(Shortage::is_felt);
             let mut growing = shortages.iter().filter(|shortage| !shortage.fixed).peekable();
@@ -365,10 +364,12 @@ impl Flight<'_> {
                 self.plan_anew(&camera, self.prepared.capacities.again())?;
             }
             if !is_drawn_again {
+                flying.cpu += start.elapsed();
                 return Ok(fell_short);
             }
             flying.events.push(Event::DrawnAgain);
             *place = self.launch()?;
+            flying.cpu += start.elapsed();
             place.slot.finish()?;
             if let Some(now) = &now {
                 self.show(now)?;

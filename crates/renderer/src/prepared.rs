@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::flight::ScenePose;
 use afterlight_graph::{Executor, FrameInput, FrameReport, ResourceId, gpu};
-use afterlight_scene::Camera;
+use afterlight_scene::{Camera, Light};
 
 use afterlight_frame::{
     CameraView, DrawParams, LightPairs, SceneLights, Settings, TechniqueError, View, ViewInput, ViewInputs,
@@ -85,26 +85,32 @@ impl Viewed {
         self.moved.placed.as_deref().unwrap_or(&self.scene.rest)
     }
 
-    /// Moves surfaces and lights to a pose, or to where they were uploaded. The camera must be looked through again.
-    pub fn place(&mut self, pose: Option<&ScenePose>) -> Result<(), TechniqueError> {
+    /// Moves surfaces and lights to a pose, or to where they were uploaded, of which `rest_lights` are the lights. The camera must be looked
+    /// through again.
+    pub fn place(&mut self, pose: Option<&ScenePose>, rest_lights: &[Light]) -> Result<(), TechniqueError> {
         let is_at_rest = self.moved.placed.is_none() && self.moved.lights.is_none();
+        if pose.is_none() && is_at_rest {
+            return Ok(());
+        }
+        self.pose += 1;
+        let lights = pose.and_then(|pose| pose.lights.as_deref());
+        self.moved.lights = match lights {
+            None => None,
+            Some(lights) => {
+                let moved = self.lights.moved(lights);
+                Some(Arc::new(moved.ok_or(TechniqueError::OtherLights { expected: self.lights.count })?))
+            }
+        };
+        let lights = lights.unwrap_or(rest_lights);
+        self.settings.lights.clear();
+        self.settings.lights.extend_from_slice(lights);
         let Some(pose) = pose else {
-            self.moved = Moved::default();
-            self.pose += u64::from(!is_at_rest);
+            self.moved.placed = None;
             return Ok(());
         };
-        self.pose += 1;
         let placed = self.moved.placed.get_or_insert_with(|| Box::new(self.scene.rest.clone()));
-        placed
-            .place(&self.scene.draw_sources, &pose.world_from_objects)
-            .map_err(|over: TurnedOver| TechniqueError::TurnedOver { instance: over.instance })?;
-        if let Some(lights) = &pose.lights {
-            let moved = self.lights.moved(lights);
-            let moved = moved.ok_or(TechniqueError::OtherLights { expected: self.lights.count })?;
-            self.moved.lights = Some(Arc::new(moved));
-            self.settings.lights.clone_from(lights);
-        }
-        Ok(())
+        let moved = placed.place(&self.scene.draw_sources, &pose.world_from_objects);
+        moved.map_err(|TurnedOver { instance }| TechniqueError::TurnedOver { instance })
     }
 
     fn choose_draws(&mut self) {

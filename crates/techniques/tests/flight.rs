@@ -239,13 +239,16 @@ fn every_frame_of_a_scene_that_moves_is_the_picture_of_its_pose() {
         let mut flight = renderer
             .fly(*technique, &Params::default(), &camera, options)
             .unwrap_or_else(|e| panic!("{id}: {e}"));
-        let contexts = (0..).zip(&poses).map(|(index, pose)| FrameContext {
+        // The last frame is at rest again, as the first pose is.
+        let moving = poses.iter().map(|pose| Some(pose.clone())).chain([None]);
+        let contexts = (0..).zip(moving).map(|(index, pose)| FrameContext {
             index,
             time_s: index as f64,
             camera: camera.clone(),
-            pose: Some(pose.clone()),
+            pose,
         });
-        let (pictures, _) = flown(&mut flight, contexts);
+        let (mut pictures, _) = flown(&mut flight, contexts);
+        let at_rest = pictures.pop().expect("a last frame");
         let of_pose = |(stage, pose): (&Stage, &Arc<ScenePose>)| {
             let lights = pose.lights.clone().expect("they move");
             let mut prepared = stage.prepare(*technique, &Settings { lights, ..settings.clone() });
@@ -255,6 +258,9 @@ fn every_frame_of_a_scene_that_moves_is_the_picture_of_its_pose() {
         let off: Vec<_> =
             unlike(&pictures, &alone).into_iter().filter(|(_, db)| *db < UNORDERED_DB).collect();
         assert!(off.is_empty(), "{id} at {samples} samples: frames and dB {off:?}");
+        let off: Vec<_> =
+            unlike(&[at_rest], &alone[..1]).into_iter().filter(|(_, db)| *db < UNORDERED_DB).collect();
+        assert!(off.is_empty(), "{id} at {samples} samples, at rest again: {off:?}");
         // The mutant: every frame in the pose of the frame before.
         let mut late = pictures.clone();
         late.rotate_right(1);
