@@ -872,6 +872,7 @@ fn play_tells_how_steady_frames_are() {
     assert!(output.status.success(), "{}", text(&output.stderr));
     let played = json(&output);
     assert_eq!(played["schema"], 1);
+    assert_eq!((&played["path"], &played["settings"]["camera"]), (&"nave".into(), &"nave".into()));
     let techniques = played["techniques"].as_array().expect("a list");
     let frames: Vec<_> =
         techniques.iter().map(|one| (one["technique"].clone(), one["frames"].clone())).collect();
@@ -892,4 +893,6 @@ fn play_tells_how_steady_frames_are() {
     refused(&["play", "--technique", "tiled", "--frames", "0"], 2, &["--frames"]);
     refused(&["play", "--technique", "tiled", "-o", "frames.png"], 2, &["--output", "%04d"]);
     refused(&["play", "--technique", "tiled", "--in-flight", "9"], 2, &["--in-flight"]);
+    refused(&["play", "--technique", "tiled", "--camera", "0"], 2, &["--camera", "--path"]);
+    refused(&["play", "--technique", "tiled", "--path", "nowhere"], 2, &["nowhere", "nave"]);
 }

@@ -13,6 +13,7 @@ pub struct CameraView {
     pub clip_from_world: Mat4,
     view_from_world: Mat4,
     projection: Projection,
+    size_px: [u32; 2],
     /// The eye, world space, m; where a fitted orthographic view has moved it to.
     pub eye_ws: Vec3,
     /// How far the eye was moved along the view: how much less view distances are than from the camera, m.
@@ -24,20 +25,17 @@ impl CameraView {
     pub fn fitted(settings: &Settings, placed: &Placed) -> Self {
         let bounds_ws = placed.all_bounds_ws(settings.effects.tessellation.displacement_m());
         let (camera, eye_moved_m) = settings.camera.fitted(&bounds_ws);
-        Self { eye_moved_m, ..Self::of(&camera, settings) }
+        Self { eye_moved_m, ..Self::new(&camera, [settings.width_px, settings.height_px]) }
     }
 
-    /// The view of the settings' camera at their width and height.
-    pub fn new(settings: &Settings) -> Self {
-        Self::of(&settings.camera, settings)
-    }
-
-    fn of(camera: &Camera, settings: &Settings) -> Self {
-        let aspect = settings.width_px as f32 / settings.height_px as f32;
+    /// The view of a camera for an image size, width and height in pixels.
+    pub fn new(camera: &Camera, size_px: [u32; 2]) -> Self {
+        let aspect = size_px[0] as f32 / size_px[1] as f32;
         Self {
             clip_from_world: camera.clip_from_world(aspect),
             view_from_world: camera.view_from_world(),
             projection: camera.projection,
+            size_px,
             eye_ws: camera.eye_ws(),
             eye_moved_m: 0.0,
         }
@@ -53,7 +51,7 @@ impl CameraView {
         -self.view_from_world.row(2)
     }
 
-    /// What `include/frame.glsl` declares, for this view of surfaces within `bounds_ws`.
+    /// What `include/frame.glsl` declares, for this view of surfaces within `bounds_ws`, in the surroundings of the settings.
     pub fn constants(&self, settings: &Settings, lights: &SceneLights, bounds_ws: &Aabb) -> FrameConstants {
         let distance_from_world = self.distance_from_world();
         let near_m = match self.projection {
@@ -74,8 +72,8 @@ impl CameraView {
             depth_to_distance: depth_to_distance.into(),
             distance_from_world: distance_from_world.into(),
             eye_ws: eye.into(),
-            size_px: [settings.width_px, settings.height_px],
-            tile_count: [settings.width_px.div_ceil(16), settings.height_px.div_ceil(16)],
+            size_px: self.size_px,
+            tile_count: self.size_px.map(|px| px.div_ceil(16)),
             ambient_radiance: settings.environment.ambient_radiance.into(),
             light_count: lights.count,
             background_radiance: background_radiance(settings).into(),

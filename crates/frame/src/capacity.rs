@@ -26,10 +26,10 @@ pub const FIRST_GUESS: u32 = 16;
 const UNSTEADY_FRAMES: u32 = 4;
 
 /// What a frame counted of something that can overflow.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Counter {
     /// What is counted: `blocks`.
-    pub name: String,
+    pub name: &'static str,
     /// Elements that the frame asked for; `u32::MAX` where their sum passed 2³² on the device.
     pub needed: u32,
     /// Elements that there was room for.
@@ -50,6 +50,16 @@ pub fn most(before: Vec<Counter>, last: Vec<Counter>) -> Vec<Counter> {
 }
 
 impl Counter {
+    /// Whether the frame lacked something.
+    pub fn fell_short(&self) -> bool {
+        self.dropped > 0 || self.needed > self.capacity
+    }
+
+    /// Whether the list should grow before the next frame: it fell short, or less than a sixteenth of its room is left.
+    pub fn is_scarce(&self) -> bool {
+        !self.fixed && (self.fell_short() || self.needed > self.capacity - self.capacity / 16)
+    }
+
     /// What found no room, in words; none where all did.
     pub fn dropped_text(&self) -> Option<String> {
         let Self { name, needed, capacity, dropped, .. } = self;
@@ -84,67 +94,27 @@ impl Demand {
         self.resource
     }
 
-    /// What the frame fell short of, from the bytes of [`Self::resource`] after it: also where it found room, but the next one may not.
-    pub fn shortage(&self, bytes: &[u8]) -> Option<Shortage> {
-        let (needed, dropped) = self.words(bytes);
-        let Self { name, capacity, fixed, .. } = *self;
-        let shortage = Shortage { list: name, needed, capacity, dropped, fixed };
-        (shortage.is_felt() || !fixed && is_scarce(needed, capacity)).then_some(shortage)
+    /// Reads the last frame's count.
+    pub fn read(&self, executor: &Executor) -> Result<Counter, TechniqueError> {
+        Ok(self.count(&executor.read_buffer(self.resource)?))
     }
 
-    /// What was needed and what was dropped, from the bytes of the counter's buffer. What fits drops nothing: where something was dropped and
-    /// the sum is still within the capacity, it has passed 2³² and begun anew.
-    fn words(&self, bytes: &[u8]) -> (u32, u32) {
+    /// What a frame counted, from the bytes of [`Self::resource`] after it.
+    pub fn count(&self, bytes: &[u8]) -> Counter {
         let word = |i: usize| {
             let i = self.first_word + i;
             bytes.get(4 * i..4 * i + 4).map_or(0, |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]))
         };
-        self.unwrapped(word(0), word(1))
+        self.counted(word(0), word(1))
     }
 
-    fn unwrapped(&self, needed: u32, dropped: u32) -> (u32, u32) {
-        let has_wrapped = dropped > 0 && needed <= self.capacity;
-        (if has_wrapped { u32::MAX } else { needed }, dropped)
-    }
-
-    /// Reads the last frame's count.
-    pub fn read(&self, executor: &Executor) -> Result<Counter, TechniqueError> {
-        let (needed, dropped) = self.words(&executor.read_buffer(self.resource)?);
-        Ok(self.counted(needed, dropped))
-    }
-
+    /// The counter of two words from the device. What fits drops nothing: where something was dropped and the sum is still within the
+    /// capacity, it has passed 2³² and begun anew.
     fn counted(&self, needed: u32, dropped: u32) -> Counter {
         let Self { name, capacity, fixed, .. } = *self;
-        let (needed, dropped) = self.unwrapped(needed, dropped);
-        Counter { name: name.to_owned(), needed, capacity, dropped, fixed }
+        let has_wrapped = dropped > 0 && needed <= capacity;
+        Counter { name, needed: if has_wrapped { u32::MAX } else { needed }, capacity, dropped, fixed }
     }
-}
-
-/// What a frame needed of a list that had no room for it, or hardly any.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Shortage {
-    /// What is counted: `blocks`.
-    pub list: &'static str,
-    /// Elements that the frame needed; `u32::MAX` where their sum passed 2³² on the device.
-    pub needed: u32,
-    /// Elements that there was room for.
-    pub capacity: u32,
-    /// What was dropped for want of room, in the list's own unit.
-    pub dropped: u32,
-    /// Whether the capacity was set by a parameter.
-    pub fixed: bool,
-}
-
-impl Shortage {
-    /// Whether the frame lacked something, and not only the next one may.
-    pub fn is_felt(&self) -> bool {
-        self.dropped > 0 || self.needed > self.capacity
-    }
-}
-
-/// Whether so much of a list is needed that the next frame may find no room: less than a sixteenth is left.
-fn is_scarce(needed: u32, capacity: u32) -> bool {
-    needed > capacity - capacity / 16
 }
 
 /// Capacities known from the frames before, and the counters that the frame being recorded has.
@@ -181,26 +151,25 @@ impl Capacities {
         }
     }
 
-    /// Whether this recording has as little room as the one that fell short.
-    pub fn lack(&self, shortages: &[Shortage]) -> bool {
+    /// Whether what a frame counted would be scarce in this recording as well.
+    pub fn lack(&self, counters: &[Counter]) -> bool {
         let demands = self.demands.borrow();
-        let lacks = |shortage: &&Shortage| {
-            let demand = demands.iter().find(|demand| demand.name == shortage.list);
-            demand.is_some_and(|demand| !demand.fixed && is_scarce(shortage.needed, demand.capacity))
+        let lacks = |counter: &Counter| {
+            let demand = demands.iter().find(|demand| demand.name == counter.name);
+            demand.is_some_and(|demand| demand.counted(counter.needed, 0).is_scarce())
         };
-        shortages.iter().any(|shortage| lacks(&shortage))
+        counters.iter().any(lacks)
     }
 
-    /// Capacities for another recording, with half as much again as a frame needed of the lists that it fell short of: a camera that goes on
-    /// moving needs more.
-    pub fn grown(&self, shortages: &[Shortage]) -> Self {
+    /// Capacities for another recording, with half as much again as a frame needed of what was scarce: a camera that goes on moving needs
+    /// more.
+    pub fn grown(&self, counters: &[Counter]) -> Self {
         let mut grown = self.again();
-        for (name, capacity) in &mut grown.known {
-            if let Some(shortage) = shortages.iter().find(|shortage| shortage.list == name) {
-                let needed = u64::from(shortage.needed);
-                let room = u32::try_from(needed + needed / 2 + u64::from(SLACK / 8)).unwrap_or(u32::MAX);
-                *capacity = room.max(*capacity);
-            }
+        for counter in counters.iter().filter(|counter| counter.is_scarce()) {
+            let needed = u64::from(counter.needed);
+            let room = u32::try_from(needed + needed / 2 + u64::from(SLACK / 8)).unwrap_or(u32::MAX);
+            let known = grown.known.iter_mut().filter(|(name, _)| name == counter.name);
+            known.for_each(|(_, capacity)| *capacity = room.max(*capacity));
         }
         grown
     }
@@ -228,8 +197,10 @@ impl Capacities {
         if counters.iter().all(fits) {
             return None;
         }
-        let known =
-            counters.iter().map(|c| (c.name.clone(), if fits(c) { c.capacity } else { room(c) })).collect();
+        let known = counters
+            .iter()
+            .map(|c| (c.name.to_owned(), if fits(c) { c.capacity } else { room(c) }))
+            .collect();
         Some(Self { known, demands: RefCell::default() })
     }
 }
@@ -288,7 +259,7 @@ mod tests {
     use afterlight_graph::BufferRole;
 
     fn counter(needed: u32, capacity: u32, fixed: bool) -> Counter {
-        Counter { name: "blocks".to_owned(), needed, capacity, dropped: 0, fixed }
+        Counter { name: "blocks", needed, capacity, dropped: 0, fixed }
     }
 
     #[test]
@@ -350,6 +321,22 @@ mod tests {
         assert!(of(false).next(&[counter(8, 16, false)]).is_none());
         let next = of(true).next(&[counter(8, 16, false)]).expect("room for more");
         assert_eq!(next.known[0].1, 8 + 8 + SLACK / 8);
+    }
+
+    /// A list grows before it falls short: where less than a sixteenth of its room is left. A bound that the user fixed never grows.
+    #[test]
+    fn what_is_nearly_full_grows_by_half() {
+        assert!(!counter(1500, 1600, false).is_scarce() && !counter(1500, 1600, false).fell_short());
+        assert!(counter(1501, 1600, false).is_scarce() && !counter(1501, 1600, false).fell_short());
+        assert!(counter(1601, 1600, true).fell_short() && !counter(1601, 1600, true).is_scarce());
+        let recorded = |capacity| Capacities {
+            known: Vec::new(),
+            demands: RefCell::new(vec![Demand::of("blocks", kept(), capacity)]),
+        };
+        let counters = [counter(1501, 1600, false)];
+        assert_eq!(recorded(1600).grown(&counters).known[0].1, 1501 + 750 + SLACK / 8);
+        assert_eq!(recorded(9000).grown(&counters).known[0].1, 9000, "what another frame has made is kept");
+        assert!(recorded(1600).lack(&counters) && !recorded(1602).lack(&counters));
     }
 
     #[test]

@@ -109,9 +109,7 @@ impl ViewInputs {
     pub fn into_parts(self) -> (Vec<ViewInput>, Vec<ViewScript>, bool) {
         (self.inputs.into_inner(), self.scripts.into_inner(), !self.holds_for_one_view.get())
     }
-}
 
-impl ViewInputs {
     /// Brings a buffer of `bytes` bytes into the graph that is filled for each view before the first pass. `fill` computes all that passes
     /// read of it, from the view alone.
     ///
@@ -250,30 +248,14 @@ impl Frame<'_> {
     ///
     /// # Errors
     /// The device.
-    pub fn of_view(
+    pub fn input(
         &self,
         graph: &mut Graph,
         named: (&str, BufferRole),
-        bytes: u64,
-        usage: vk::BufferUsageFlags,
+        how: (u64, vk::BufferUsageFlags, ChangesWith),
         fill: impl Fn(&View<'_>, &mut [u8]) + Send + Sync + 'static,
     ) -> Result<BufferHandle, TechniqueError> {
-        self.inputs.declare(self.device, graph, named, (bytes, usage, ChangesWith::Camera), fill)
-    }
-
-    /// As [`Self::of_view`], of what does not change with the camera, but with where surfaces stand.
-    ///
-    /// # Errors
-    /// The device.
-    pub fn of_pose(
-        &self,
-        graph: &mut Graph,
-        named: (&str, BufferRole),
-        bytes: u64,
-        usage: vk::BufferUsageFlags,
-        fill: impl Fn(&View<'_>, &mut [u8]) + Send + Sync + 'static,
-    ) -> Result<BufferHandle, TechniqueError> {
-        self.inputs.declare(self.device, graph, named, (bytes, usage, ChangesWith::Pose), fill)
+        self.inputs.declare(self.device, graph, named, how, fill)
     }
 
     /// As [`Frame::table`], of words that the view decides: at most `most_words`, of which `words` gives the first.
@@ -283,14 +265,13 @@ impl Frame<'_> {
     pub fn table_of_view(
         &self,
         graph: &mut Graph,
-        (name, role): (&str, BufferRole),
+        named: (&str, BufferRole),
         most_words: usize,
         words: impl Fn(&View<'_>) -> Vec<u32> + Send + Sync + 'static,
     ) -> Result<BufferHandle, TechniqueError> {
         let usage = vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::INDIRECT_BUFFER;
-        self.of_view(graph, (name, role), 4 * most_words.max(1) as u64, usage, move |view, bytes| {
-            put(bytes, 0, &words(view));
-        })
+        let how = (4 * most_words.max(1) as u64, usage, ChangesWith::Camera);
+        self.input(graph, named, how, move |view, bytes| put(bytes, 0, &words(view)))
     }
 
     /// Lets `steps` choose the draws of a pass for each view, among those that it declares.

@@ -25,13 +25,16 @@ pub fn upload_slice<T: bytemuck::NoUninit>(
     Ok(buffer)
 }
 
-/// Writes values from `offset` bytes on; what finds no room is left out.
+/// Writes values from `offset` bytes on.
+///
+/// # Panics
+/// Where they find no room: whoever declares a buffer knows how much any view writes.
 pub fn put<T: bytemuck::NoUninit>(bytes: &mut [u8], offset: usize, values: &[T]) {
     let from: &[u8] = bytemuck::cast_slice(values);
-    if let Some(to) = bytes.get_mut(offset..) {
-        let count = from.len().min(to.len());
-        to[..count].copy_from_slice(&from[..count]);
-    }
+    let room = bytes.len();
+    let to = bytes.get_mut(offset..).and_then(|rest| rest.get_mut(..from.len()));
+    let to = to.unwrap_or_else(|| panic!("{} bytes at {offset} of a buffer of {room}", from.len()));
+    to.copy_from_slice(from);
 }
 
 /// Texels of a row of a record image: shaders address rows of this length.

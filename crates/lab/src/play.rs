@@ -1,7 +1,8 @@
 //! Frames in flight along a camera path: what they take when nobody waits for them.
 
 use afterlight_measure::{
-    CapacityEvent, Distribution, HITCH_FACTOR, Hitch, Play, PlayMemory, Played, SCHEMA, Spread,
+    CapacityEvent, Distribution, HITCH_FACTOR, Hitch, Play, PlayMemory, Played, SCHEMA, SettingsRecord,
+    Spread,
 };
 use std::sync::Arc;
 
@@ -138,10 +139,7 @@ pub fn play(
                 (true, _) => flight.land(&mut done)?,
                 (false, true) => {
                     let camera = how.camera(path, frame);
-                    flight.frame(
-                        FrameContext { index: frame, time_s, camera, pose: pose.clone() },
-                        &mut done,
-                    )?;
+                    flight.frame(FrameContext { index: frame, camera, pose: pose.clone() }, &mut done)?;
                 }
                 (false, false) => flight.poll(&mut done)?,
             }
@@ -237,7 +235,7 @@ fn hitches(intervals_ms: &[f64], seen: &[Seen], ids: &[&str]) -> Vec<Hitch> {
 fn cause(event: &Event) -> String {
     match event {
         Event::Planned => "planned anew for its view".to_owned(),
-        Event::Grown(shortage) => format!("{} grew", shortage.list),
+        Event::Grown(counter) => format!("{} grew", counter.name),
         Event::DrawnAgain => "drawn again".to_owned(),
     }
 }
@@ -266,7 +264,7 @@ fn record(
         let one = |event: &Event| match event {
             Event::Grown(short) => Some(CapacityEvent {
                 frame,
-                list: short.list.to_owned(),
+                list: short.name.to_owned(),
                 needed: short.needed,
                 capacity: short.capacity,
                 dropped: short.dropped,
@@ -284,7 +282,10 @@ fn record(
         schema: SCHEMA,
         device: session.device.clone(),
         scene: session.scene.clone(),
-        settings: session.settings_record(spec, u32::try_from(how.frames).unwrap_or(u32::MAX), ids[0]),
+        settings: SettingsRecord {
+            camera: how.camera(path, 0).name,
+            ..session.settings_record(spec, u32::try_from(how.frames).unwrap_or(u32::MAX), ids[0])
+        },
         path: path.name.clone(),
         fps: how.fps,
         in_flight: how.in_flight,

@@ -51,7 +51,7 @@ pub struct Played {
     pub technique: String,
     /// Frames that it drew.
     pub frames: u64,
-    /// Device time of a frame from its first pass to its last, milliseconds, as `frame_ms` of `compare`; none without timestamps.
+    /// Device time of a frame from its first pass to its last, milliseconds; none without timestamps.
     pub gpu_ms: Option<Distribution>,
     /// Time of the host's thread that a frame took, waiting for the device left out, milliseconds.
     pub cpu_ms: Option<Distribution>,

@@ -16,7 +16,7 @@ use glam::Affine3A;
 use crate::{Prepared, Renderer, renderer::Recipe};
 use afterlight_frame::{
     ChangesWith, Params, Settings, Technique, TechniqueError,
-    capacity::{Capacities, Demand, Shortage},
+    capacity::{Capacities, Counter, Demand},
     completed,
 };
 
@@ -56,8 +56,6 @@ impl Default for FlightOptions {
 pub struct FrameContext {
     /// Number of the frame.
     pub index: u64,
-    /// Time of the scene, seconds.
-    pub time_s: f64,
     /// The camera.
     pub camera: Camera,
     /// Where surfaces and lights of the scene are; `None` is where they were uploaded.
@@ -79,7 +77,7 @@ pub enum Event {
     /// The technique records what holds for one view alone, so the frame was planned anew.
     Planned,
     /// A list had no room for what the frame needed, or hardly any: it grows.
-    Grown(Shortage),
+    Grown(Counter),
     /// The frame was drawn again, with room.
     DrawnAgain,
 }
@@ -315,7 +313,7 @@ impl Flight<'_> {
             }
             let Some(mut place) = self.places.remove(oldest) else { return Ok(()) };
             let Some(mut flying) = place.flying.take() else { return Ok(()) };
-            place.slot.finish()?;
+            place.slot.wait()?;
             let fell_short = self.make_room(&mut place, &mut flying)?;
             let times = place.slot.finish()?.clone();
             let picture = self.options.pictures.then_some(place.demands.len());
@@ -342,15 +340,16 @@ impl Flight<'_> {
     /// Gives lists that had no room for what a frame needed, or hardly any, more of it, and draws the frame again where something was dropped
     /// and the options say so. Returns whether the frame that `place` now holds dropped something.
     fn make_room(&mut self, place: &mut Place, flying: &mut Flying) -> Result<bool, TechniqueError> {
-        for again in 0..=DRAWN_AGAIN_MAX {
+        let mut drawings_left = DRAWN_AGAIN_MAX;
+        loop {
             let start = Instant::now();
-            let shortages = place.shortages()?;
-            let fell_short = shortages.iter().any(Shortage::is_felt);
-            let mut growing = shortages.iter().filter(|shortage| !shortage.fixed).peekable();
-            if growing.peek().is_none() || again == DRAWN_AGAIN_MAX {
+            let counters = place.counters()?;
+            let fell_short = counters.iter().any(Counter::fell_short);
+            if drawings_left == 0 || !counters.iter().any(Counter::is_scarce) {
                 return Ok(fell_short);
             }
-            flying.events.extend(growing.map(|shortage| Event::Grown(shortage.clone())));
+            drawings_left -= 1;
+            flying.events.extend(counters.iter().filter(|one| one.is_scarce()).copied().map(Event::Grown));
             let now = self.shown.clone();
             let is_drawn_again = fell_short && self.options.shortfall == Shortfall::DrawAgain;
             if is_drawn_again {
@@ -358,8 +357,8 @@ impl Flight<'_> {
             }
             let camera = self.prepared.viewed.settings.camera.clone();
             // A frame before this one may have made room already.
-            if self.prepared.capacities.lack(&shortages) {
-                self.plan_anew(&camera, self.prepared.capacities.grown(&shortages))?;
+            if self.prepared.capacities.lack(&counters) {
+                self.plan_anew(&camera, self.prepared.capacities.grown(&counters))?;
             } else if is_drawn_again && !self.prepared.shows_all_views {
                 self.plan_anew(&camera, self.prepared.capacities.again())?;
             }
@@ -370,22 +369,19 @@ impl Flight<'_> {
             flying.events.push(Event::DrawnAgain);
             *place = self.launch()?;
             flying.cpu += start.elapsed();
-            place.slot.finish()?;
+            place.slot.wait()?;
             if let Some(now) = &now {
                 self.show(now)?;
             }
         }
-        Ok(false)
     }
 }
 
 impl Place {
-    /// Lists that had no room for what the frame needed, or hardly any.
-    fn shortages(&mut self) -> Result<Vec<Shortage>, TechniqueError> {
-        let mut shortages = Vec::new();
-        for (output, demand) in self.demands.iter().enumerate() {
-            shortages.extend(self.slot.read(output, |bytes| demand.shortage(bytes))?);
-        }
-        Ok(shortages)
+    /// What the frame counted of lists that can overflow.
+    fn counters(&mut self) -> Result<Vec<Counter>, TechniqueError> {
+        let slot = &mut self.slot;
+        let demands = self.demands.iter().enumerate();
+        demands.map(|(output, demand)| Ok(slot.read(output, |bytes| demand.count(bytes))?)).collect()
     }
 }

@@ -202,20 +202,6 @@ impl Prepared {
         Ok(uploader.finish()?)
     }
 
-    /// Shows another view from the next frame on, without a new plan. False where the technique has recorded what holds for one view alone, or
-    /// what was prepared does not move: nothing changes then.
-    ///
-    /// # Errors
-    /// The device.
-    pub fn update(&mut self, camera: &Camera) -> Result<bool, TechniqueError> {
-        if !self.shows_all_views {
-            return Ok(false);
-        }
-        self.viewed.look_through(camera);
-        self.fill_inputs()?;
-        Ok(true)
-    }
-
     /// Renders a frame and waits for it.
     ///
     /// # Errors

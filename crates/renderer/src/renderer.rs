@@ -171,21 +171,7 @@ impl Renderer {
         self.prepare_recipe(&recipe, &self.settings, also)
     }
 
-    /// As [`Renderer::prepare`] for a camera that moves: what any view of the scene may need is recorded, so that [`Prepared::update`] can
-    /// show other views without a new plan.
-    ///
-    /// # Errors
-    /// As [`Renderer::prepare`].
-    pub fn prepare_moving(
-        &self,
-        technique: &dyn Technique,
-        params: &Params,
-        camera: &Camera,
-    ) -> Result<Prepared, TechniqueError> {
-        let params = &completed(technique, params);
-        self.prepare_to_move(&Recipe { technique, params, moves: true, scene_moves: false }, camera)
-    }
-
+    /// As [`Self::prepare`] for views that change: what any view of the scene may need is recorded.
     pub(crate) fn prepare_to_move(
         &self,
         recipe: &Recipe<'_>,

@@ -23,6 +23,10 @@ pub fn run(args: &PlayArgs) -> Result<(), Failure> {
         check_file(path)?;
     }
     let spec = args.common.spec()?;
+    if let Some(camera) = &spec.camera {
+        let expected = "none: cameras are the path's (--path takes a camera that moves by its name)";
+        return Err(Failure::option("--camera", camera, expected));
+    }
     let how = PlaySpec {
         frames: args.frames,
         fps: args.fps,

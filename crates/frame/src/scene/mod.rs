@@ -127,7 +127,7 @@ impl SceneGpu {
             triangle_count: draws.infos.iter().map(|d| u64::from(d.index_count / 3)).sum(),
             vertex_count: scene.positions_os.len() as u64,
             draw_sources: draws.sources,
-            rest: Placed { records: draws.data, infos: draws.infos, blended },
+            rest: Placed::new(draws.data, draws.infos, blended),
             bucket_first: draws.bucket_first,
             draws: draw_buffer,
             draw_data,

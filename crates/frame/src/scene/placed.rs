@@ -24,6 +24,8 @@ pub struct Placed {
     pub infos: Vec<DrawInfo>,
     /// Draws with alpha blending.
     pub blended: Blended,
+    /// Box of the draws in buckets, and of those with alpha blending: kept, since every frame asks and scenes have many draws.
+    bounds_ws: [Aabb; 2],
 }
 
 /// An instance that a motion has turned inside out: its draws would belong to another bucket.
@@ -34,15 +36,20 @@ pub struct TurnedOver {
 }
 
 impl Placed {
+    /// Draws where their records and bounds say.
+    pub(super) fn new(records: Vec<DrawData>, infos: Vec<DrawInfo>, blended: Blended) -> Self {
+        let bounds_ws = find_bounds(&infos, &blended);
+        Self { records, infos, blended, bounds_ws }
+    }
+
     /// Box of all surfaces without alpha blending in world space, which displacement moves along each axis at most as far as said, m.
     pub fn bounds_ws(&self, displacement_m: f32) -> Aabb {
-        let bounds = self.infos.iter().fold(Aabb::EMPTY, |bounds, draw| bounds.union(&draw.bounds_ws));
-        displaced(&bounds, displacement_m)
+        displaced(&self.bounds_ws[0], displacement_m)
     }
 
     /// The same of all surfaces, those with alpha blending too.
     pub fn all_bounds_ws(&self, displacement_m: f32) -> Aabb {
-        self.bounds_ws(displacement_m).union(&displaced(&self.blended.bounds_ws(), displacement_m))
+        self.bounds_ws(displacement_m).union(&displaced(&self.bounds_ws[1], displacement_m))
     }
 
     /// Moves all draws to where their instances are: `sources` has one entry a draw, `world_from_objects` one an instance.
@@ -72,8 +79,14 @@ impl Placed {
                 Some(place) => self.blended.place(place, record, bounds_ws),
             }
         }
+        self.bounds_ws = find_bounds(&self.infos, &self.blended);
         Ok(())
     }
+}
+
+/// Boxes of the draws in buckets, and of those with alpha blending.
+fn find_bounds(infos: &[DrawInfo], blended: &Blended) -> [Aabb; 2] {
+    [infos.iter().fold(Aabb::EMPTY, |bounds, draw| bounds.union(&draw.bounds_ws)), blended.bounds_ws()]
 }
 
 /// Rows of a matrix as a draw's record has them.

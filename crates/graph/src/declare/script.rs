@@ -13,7 +13,7 @@ pub struct ScriptId(pub(crate) u32);
 pub enum Step {
     /// Makes one of the pass's draws, changed in what is said.
     Draw {
-        /// Which, in the order in which the pass declared them; none is made where there are not so many.
+        /// Which, in the order in which the pass declared them, from 0.
         draw: u32,
         /// Its scissor; the draw's own where none is said.
         scissor: Option<Rect>,
@@ -56,7 +56,7 @@ impl Graph {
 
 impl RasterPass<'_> {
     /// Lets a script make the pass's draws: those of the pass are what it chooses from, in the order of their declaration. A frame makes none
-    /// until [`Executor::set_script`](crate::Executor::set_script) says which.
+    /// until [`Executor::set_script`](crate::Executor::set_script) says which. The pass declares draws alone: a script clears by itself.
     pub fn script(&mut self) -> ScriptId {
         let id = self.graph.next_script();
         self.node().script = Some(id);

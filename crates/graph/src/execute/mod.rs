@@ -82,8 +82,8 @@ impl Executor {
         self.scripts[script.0 as usize] = steps;
     }
 
-    /// Records all passes.
-    fn record(&self, encoder: &mut gpu::Encoder) -> Result<Marks, gpu::GpuError> {
+    /// Records all passes; `counts` what the pipeline does in each.
+    fn record(&self, encoder: &mut gpu::Encoder, counts: bool) -> Result<Marks, gpu::GpuError> {
         let mut times = Vec::with_capacity(self.passes.len() + 1);
         let mut statistics = Vec::with_capacity(self.passes.len());
         times.push(encoder.timestamp(vk::PipelineStageFlags2::ALL_COMMANDS)?);
@@ -91,12 +91,12 @@ impl Executor {
             encoder.begin_label(&pass.name);
             pass.barriers.record(encoder);
             // A query spans the whole of a rendering scope: it may neither begin nor end within.
-            let query = encoder.begin_statistics()?;
+            let query = counts.then(|| encoder.begin_statistics()).transpose()?;
             pass.body.record(encoder, &self.scripts)?;
-            encoder.end_statistics(query);
+            query.into_iter().for_each(|query| encoder.end_statistics(query));
             encoder.end_label();
             times.push(encoder.timestamp(vk::PipelineStageFlags2::ALL_COMMANDS)?);
-            statistics.push(query);
+            statistics.extend(query);
         }
         self.final_barriers.record(encoder);
         Ok(Marks { times, statistics })
@@ -110,7 +110,7 @@ impl Executor {
         let start = Instant::now();
         let mut encoder = self.device.encoder()?;
         slot::after_earlier_frames(&mut encoder);
-        let Marks { times, statistics } = self.record(&mut encoder)?;
+        let Marks { times, statistics } = self.record(&mut encoder, true)?;
         let recorded = Instant::now();
         let completed = self.device.submit(encoder)?;
         let done = Instant::now();
@@ -145,6 +145,7 @@ impl Executor {
 struct Marks {
     /// The first pass begins at the first, each pass ends at the next.
     times: Vec<gpu::TimestampId>,
+    /// One a pass, or none.
     statistics: Vec<gpu::StatisticsId>,
 }
 

@@ -76,8 +76,9 @@ impl Body {
                                 Step::Draw { draw, scissor, stencil_reference, push, commands: range } => {
                                     let scissor = scissor.map(|rect| rect_2d(rect, *extent));
                                     let changed = Changed { scissor, stencil_reference, push, range };
-                                    if let Some(BoundCommand::Draw(draw)) = commands.get(draw as usize) {
-                                        make(encoder, draw, &changed);
+                                    match commands.get(draw as usize) {
+                                        Some(BoundCommand::Draw(draw)) => make(encoder, draw, &changed),
+                                        _ => panic!("a script makes draw {draw} of {}", commands.len()),
                                     }
                                 }
                             }

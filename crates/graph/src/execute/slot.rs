@@ -25,18 +25,16 @@ struct Place {
     bytes: u64,
 }
 
-/// Places one after another.
+/// Room for places one after another.
 #[derive(Default)]
-struct Places {
-    all: Vec<Place>,
+struct Room {
     bytes: u64,
 }
 
-impl Places {
-    fn push(&mut self, bytes: u64) -> Place {
+impl Room {
+    fn place(&mut self, bytes: u64) -> Place {
         let place = Place { offset: self.bytes.next_multiple_of(COPY_ALIGNMENT), bytes };
         self.bytes = place.offset + bytes;
-        self.all.push(place);
         place
     }
 
@@ -134,26 +132,22 @@ impl Executor {
     /// # Errors
     /// An output that [`Executor::read_image`] or [`Executor::read_buffer`] would refuse, no memory, a recording that the device refuses.
     pub fn slot(&self, inputs: &[FrameInput], outputs: &[ResourceId]) -> Result<FrameSlot, GraphError> {
-        let mut places = Places::default();
-        inputs.iter().for_each(|input| {
-            places.push(input.bytes());
-        });
-        let written = places.buffer(&self.device, "frame inputs", gpu::MemoryKind::Upload)?;
-        let inputs_at = places.all;
+        let mut room = Room::default();
+        let inputs: Vec<_> = inputs.iter().map(|input| (input.clone(), room.place(input.bytes()))).collect();
+        let written = room.buffer(&self.device, "frame inputs", gpu::MemoryKind::Upload)?;
 
-        let mut places = Places::default();
-        let mut copies = Vec::with_capacity(outputs.len());
-        for id in outputs {
+        let mut room = Room::default();
+        let mut copied = |id: &ResourceId| {
             let copy = match &self.physical[self.find(id)?.0 as usize] {
                 Physical::Image(_) => Copied::Image(self.image_copy(id)?),
                 _ => Copied::Buffer(self.buffer(*id)?.clone()),
             };
-            let place = places.push(copy.bytes());
-            copies.push((copy, place));
-        }
-        let read = places.buffer(&self.device, "frame outputs", gpu::MemoryKind::Readback)?;
-        let inputs = inputs.iter().cloned().zip(inputs_at).collect();
-        let ends = Ends { written, inputs, read, outputs: copies };
+            let place = room.place(copy.bytes());
+            Ok((copy, place))
+        };
+        let outputs = outputs.iter().map(&mut copied).collect::<Result<Vec<_>, GraphError>>()?;
+        let read = room.buffer(&self.device, "frame outputs", gpu::MemoryKind::Readback)?;
+        let ends = Ends { written, inputs, read, outputs };
         let recorded = self.record_between(&ends)?;
         let (completed, times) = (gpu::Completed::default(), FrameTimes::default());
         Ok(FrameSlot { ends, recorded, completed, times })
@@ -179,7 +173,7 @@ impl Executor {
             }
             encoder.barriers(&[gpu::MemoryBarrier { before: ANY_WRITE, after: ANY }], &[], &[]);
         }
-        let marks = self.record(&mut encoder)?;
+        let marks = self.record(&mut encoder, false)?;
         if let Some(read) = &ends.read {
             encoder.barriers(&[gpu::MemoryBarrier { before: ANY_WRITE, after: COPY_READ }], &[], &[]);
             for (copy, place) in &ends.outputs {
@@ -252,6 +246,14 @@ impl FrameSlot {
     /// The device was lost.
     pub fn submit(&mut self) -> Result<(), GraphError> {
         Ok(self.recorded.recording.submit()?)
+    }
+
+    /// Waits for the last submission.
+    ///
+    /// # Errors
+    /// The device was lost.
+    pub fn wait(&mut self) -> Result<(), GraphError> {
+        Ok(self.recorded.recording.wait()?)
     }
 
     /// Whether the device has nothing of the frame left to do.

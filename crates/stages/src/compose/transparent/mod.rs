@@ -1,6 +1,8 @@
 //! Surfaces with alpha blending, over the opaque image of any technique: sorted back to front on the CPU, shaded forward.
 //! See the README of this folder.
 
+use std::sync::Arc;
+
 use afterlight_graph::{
     Blend, BlendEquation, BufferHandle, BufferRole, DepthTest, DrawCall, Graph, ImageHandle, Load, PassRole,
     RasterPass, gpu::vk,
@@ -11,7 +13,8 @@ use crate::{
     surfaces::{geometry::SceneDraws, shade},
 };
 use afterlight_frame::{
-    Frame, OpaqueDepth, SceneGpu, Settings, TechniqueError, Transparency, View, VisitsAllLights, put,
+    ChangesWith, Frame, OpaqueDepth, SceneGpu, Settings, TechniqueError, Transparency, View, VisitsAllLights,
+    put,
     scene::blended::{Ordered, ViewOrder},
     scene::{Bucket, draw_list::COMMAND_BYTES},
     views,
@@ -38,8 +41,7 @@ pub fn warning(settings: &Settings, scene: &SceneGpu) -> Option<String> {
     })
 }
 
-/// The triangles with alpha blending that a view needs: how many there are, or may be.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// The triangles with alpha blending that a view needs, or all that there are where views change.
 pub struct BlendedList {
     index_count: usize,
     command_count: usize,
@@ -47,6 +49,8 @@ pub struct BlendedList {
     pub draw_count: u32,
     /// Whether draws outside of the view are left out.
     cull: bool,
+    /// The order of the only view; `None` where views change.
+    order: Option<Arc<Ordered>>,
 }
 
 impl BlendedList {
@@ -56,16 +60,19 @@ impl BlendedList {
         if !is_drawn(view.settings, view.scene) {
             return None;
         }
-        let Ordered { indices, commands, draw_count } = ordered(view, cull);
+        let found = ordered(view, cull);
+        let draw_count = found.draw_count;
         if moves {
             let triangles = view.placed.blended.triangle_count();
             // A run of triangles of one draw is a command.
             let runs =
                 if triangles > SORTED_TRIANGLES_MAX { view.placed.blended.draw_count() } else { triangles };
-            return Some(Self { index_count: 3 * triangles, command_count: runs, draw_count, cull });
+            let index_count = 3 * triangles;
+            return Some(Self { index_count, command_count: runs, draw_count, cull, order: None });
         }
-        let (index_count, command_count) = (indices.len(), commands.len());
-        (command_count > 0).then_some(Self { index_count, command_count, draw_count, cull })
+        let (index_count, command_count) = (found.indices.len(), found.commands.len());
+        let order = Some(Arc::new(found));
+        (command_count > 0).then_some(Self { index_count, command_count, draw_count, cull, order })
     }
 
     /// Where the commands begin, and their count, in the one buffer that holds indices, commands and count, bytes.
@@ -77,12 +84,19 @@ impl BlendedList {
     /// The buffer, filled for each view.
     fn declare(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<BufferHandle, TechniqueError> {
         let usage = vk::BufferUsageFlags::INDEX_BUFFER | vk::BufferUsageFlags::INDIRECT_BUFFER;
-        let ([commands_at, count_at], cull) = (self.offsets(), self.cull);
-        let name = ("blended triangles", BufferRole::Scene);
-        frame.of_view(graph, name, count_at + 4, usage, move |view, bytes| {
-            let Ordered { indices, commands, .. } = ordered(view, cull);
-            put(bytes, 0, &indices);
-            put(bytes, commands_at as usize, &commands);
+        let ([commands_at, count_at], cull, order) = (self.offsets(), self.cull, self.order.clone());
+        let how = (count_at + 4, usage, ChangesWith::Camera);
+        frame.input(graph, ("blended triangles", BufferRole::Scene), how, move |view, bytes| {
+            let of_view;
+            let Ordered { indices, commands, .. } = match &order {
+                Some(order) => &**order,
+                None => {
+                    of_view = ordered(view, cull);
+                    &of_view
+                }
+            };
+            put(bytes, 0, indices);
+            put(bytes, commands_at as usize, commands);
             put(bytes, count_at as usize, &[commands.len() as u32]);
         })
     }

@@ -120,17 +120,15 @@ pub fn constants_of_pose<T: bytemuck::NoUninit>(
 ) -> Result<BufferHandle, TechniqueError> {
     let named = (name, BufferRole::Constants);
     let usage = vk::BufferUsageFlags::UNIFORM_BUFFER;
-    frame.of_pose(graph, named, size_of::<T>() as u64, usage, move |view, bytes| {
+    let how = (size_of::<T>() as u64, usage, ChangesWith::Pose);
+    frame.input(graph, named, how, move |view, bytes| {
         put(bytes, 0, &[of_source(view)]);
     })
 }
 
-/// The settings and the camera of a frame through the light, `size_px` texels a side.
-fn through(view: &View<'_>, size_px: u32) -> Option<(Settings, CameraView)> {
-    let camera = source(view)?.camera;
-    let settings = Settings { camera, width_px: size_px, height_px: size_px, ..view.settings.clone() };
-    let camera = CameraView::new(&settings);
-    Some((settings, camera))
+/// What the light sees, `size_px` texels a side.
+fn through(view: &View<'_>, size_px: u32) -> Option<CameraView> {
+    Some(CameraView::new(&source(view)?.camera, [size_px; 2]))
 }
 
 /// Lets the frame look through the light of its settings ([`source`]), `size_px` texels a side, while `declare` declares passes: constants,
@@ -145,14 +143,14 @@ pub fn look_through<T>(
     declare: impl FnOnce(&mut Graph, &Frame<'_>) -> Result<T, TechniqueError>,
 ) -> Result<T, TechniqueError> {
     let constants = constants_of_pose(graph, frame, &format!("{pass} view"), move |view| {
-        through(view, size_px).map_or_else(FrameConstants::zeroed, |(settings, camera)| {
-            camera.constants(&settings, view.lights, &view.bounds_ws())
+        through(view, size_px).map_or_else(FrameConstants::zeroed, |camera| {
+            camera.constants(view.settings, view.lights, &view.bounds_ws())
         })
     })?;
     let named = (&*format!("{pass} draw"), ChangesWith::Pose);
     let draws = frame.inputs.declare_draws(frame.device, graph, named, frame.scene, move |view| {
         let mut choice = DrawChoice::new(DrawParams::default());
-        if let Some((_, camera)) = through(view, size_px) {
+        if let Some(camera) = through(view, size_px) {
             let from = (camera.clip_from_world, camera.eye_ws);
             choice.update(view.scene, &view.placed.infos, from, view.displacement_m());
         }
