@@ -39,6 +39,9 @@ pub struct Verification {
     pub off: Vec<Finding>,
     /// How many are off in all.
     pub off_count: u64,
+    /// Images within their bounds only without pixels whose surface Vulkan leaves open, at edges and rims of masks: one of 1,000 at most.
+    #[serde(default)]
+    pub undecided: u64,
     /// The images that are least within their bounds, the worst first; none that is equal to the reference's.
     pub nearest: Vec<Finding>,
 }
@@ -104,6 +107,9 @@ pub struct Finding {
     pub margin_db: Option<f64>,
     /// Pixels whose greatest difference of a channel is 4 or more of 255; pixels that the ray caster found off, for the reference.
     pub pixels_off: u64,
+    /// Pixels whose surface Vulkan leaves open and which were left out when the image missed its bound with them.
+    #[serde(default)]
+    pub pixels_undecided: u64,
     /// The command that repeats exactly this.
     pub command: String,
     /// File of its picture, where one was written.

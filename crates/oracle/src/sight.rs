@@ -72,6 +72,8 @@ pub struct Sight {
     rounding_m: f64,
     /// What every ray shows first, where that is one triangle, and the ray through the centre is in no doubt.
     certain: Option<Hit>,
+    /// How far its rays are from the pixel's centre along each axis, pixels.
+    reach_px: f64,
 }
 
 /// A scene seen by a camera, ready to judge pixels.
@@ -125,6 +127,7 @@ impl<'a> Judge<'a> {
             may_be_nothing: false,
             rounding_m: self.rounding_m,
             certain: None,
+            reach_px: offset_px,
         };
         let mut first: Vec<Option<Hit>> = Vec::new();
         let mut is_certain = true;
@@ -210,7 +213,7 @@ impl<'a> Judge<'a> {
         let mut range: Option<[DVec3; 2]> = None;
         for [x, y] in OFFSETS {
             let offset = DVec2::new(f64::from(x), f64::from(y));
-            let ray = ray_through(self.camera, center + SNAP_PX * offset, self.size_px);
+            let ray = ray_through(self.camera, center + sight.reach_px * offset, self.size_px);
             if !self.rays.layers(&ray, hit.distance_m * (1.0 + 1e-3)).is_empty() {
                 return None;
             }
@@ -231,6 +234,12 @@ impl<'a> Judge<'a> {
 }
 
 impl Sight {
+    /// Whether every ray shows the same triangle first, in no doubt, or none shows any: what the pixel shows does not depend on how a device
+    /// snaps vertices and filters masks.
+    pub fn is_decided(&self) -> bool {
+        self.certain.is_some() || self.candidates.is_empty()
+    }
+
     /// Whether a device may have this in the pixel.
     pub fn accepts(&self, seen: Seen) -> bool {
         let Seen::Surface([near_m, far_m]) = seen else { return self.may_be_nothing };

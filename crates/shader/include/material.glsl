@@ -29,21 +29,14 @@ layout(set = 0, binding = 3, scalar) readonly buffer UvTransforms {
     vec4 uv_transforms[];   // two rows (xyz) a transform
 };
 
-// Texture coordinates and their change from pixel to pixel (used with EXPLICIT_GRADIENTS alone).
+// Texture coordinates and their changes (used with EXPLICIT_GRADIENTS alone): the differences that a quad of fragments has, between its upper
+// left pixel and the pixels beside and below it. By these forward shading chooses its mip level; analytic changes at the pixel's own centre
+// choose others where a surface is seen at a flat angle.
 struct TextureCoordinates {
     vec2 uv;
     vec2 ddx;
     vec2 ddy;
 };
-
-// Whether the plane of a triangle nearly ends in a pixel, at its horizon: 1/w changes by this fraction of it from one pixel to the next.
-// Texture coordinates have no one rate of change there, and take the differences that a quad of fragments has, by which forward shading chooses
-// its mip level.
-const float STEEP_CHANGE = 0.125;
-
-bool is_steep(float inverse_w, vec2 change) {
-    return max(abs(change.x), abs(change.y)) > STEEP_CHANGE * abs(inverse_w);
-}
 
 // Attributes interpolated at a point of a triangle.
 struct SurfacePoint {

@@ -1,4 +1,4 @@
-// From a triangle ID and a pixel to a SurfacePoint, with analytic derivatives of the texture coordinates.
+// From a triangle ID and a pixel to a SurfacePoint, with the differences of texture coordinates that its quad has.
 //
 // Barycentric coordinates come from homogeneous coordinates relative to the pixel (Olano and Greer 1997), which hold for
 // triangles that cross the plane of the eye. With q_i = (x_i - x w_i, y_i - y w_i) of the clip positions, the pixel at
@@ -24,33 +24,19 @@ float cross2(vec2 a, vec2 b) {
     return a.x * b.y - a.y * b.x;
 }
 
-// Perspective-correct barycentric coordinates at a pixel and their derivatives by pixels.
+// Perspective-correct barycentric coordinates at a pixel.
 struct Barycentrics {
     vec3 at;
-    vec3 ddx;
-    vec3 ddy;
     bool counter_clockwise; // on the screen
-    vec2 inverse_w_change;  // of 1/w by pixels, over 1/w
 };
 
 Barycentrics barycentrics_at(vec2 ndc, vec3 p0, vec3 p1, vec3 p2) {   // p: clip x, y, w
     vec2 q0 = p0.xy - ndc * p0.z, q1 = p1.xy - ndc * p1.z, q2 = p2.xy - ndc * p2.z;
     vec3 b = vec3(cross2(q1, q2), cross2(q2, q0), cross2(q0, q1));
-    // q moves by (-w, 0) for a step in x and by (0, -w) for one in y
-    vec3 w = vec3(p0.z, p1.z, p2.z);
-    vec3 bx = vec3(w.z * q1.y - w.y * q2.y, w.x * q2.y - w.z * q0.y, w.y * q0.y - w.x * q1.y);
-    vec3 by = vec3(w.y * q2.x - w.z * q1.x, w.z * q0.x - w.x * q2.x, w.x * q1.x - w.y * q0.x);
-    vec2 pixel_ndc = 2.0 / vec2(frame.size_px);
-    float sum = b.x + b.y + b.z;
     Barycentrics r;
     // The sum times the distance at the pixel: the same at every pixel, also where the triangle's plane has ended before it, at the horizon.
-    r.counter_clockwise = dot(b, w) < 0.0;
-    float inv = 1.0 / sum;
-    r.at = b * inv;
-    vec2 sum_change = vec2(bx.x + bx.y + bx.z, by.x + by.y + by.z);
-    r.inverse_w_change = sum_change * (inv * pixel_ndc);
-    r.ddx = (bx - r.at * sum_change.x) * (inv * pixel_ndc.x);
-    r.ddy = (by - r.at * sum_change.y) * (inv * pixel_ndc.y);
+    r.counter_clockwise = dot(b, vec3(p0.z, p1.z, p2.z)) < 0.0;
+    r.at = b / (b.x + b.y + b.z);
     return r;
 }
 
@@ -62,11 +48,6 @@ vec3 load_position(DrawData d, uint vertex) {
 
 vec3 clip_xyw(vec3 position_ws) {
     return (frame.clip_from_world * vec4(position_ws, 1.0)).xyw;
-}
-
-TextureCoordinates interpolate_uv(Barycentrics b, vec2 uv0, vec2 uv1, vec2 uv2) {
-    mat3x2 uv = mat3x2(uv0, uv1, uv2);
-    return TextureCoordinates(uv * b.at, uv * b.ddx, uv * b.ddy);
 }
 
 vec2 load_uv(uint first, uint offset) {
@@ -106,25 +87,23 @@ bool triangle_at(uint id, vec2 ndc, out float depth) {
     return all(greaterThanEqual(b, vec3(0.0))) && w > 0.0;
 }
 
-// Derivatives of the texture coordinates as a quad of fragments computes them: differences between its upper left pixel and the pixels
-// beside and below it. Used instead of the analytic ones where a test (alpha) must give the same result as in a fragment shader.
-void take_quad_gradients(uint id, uvec2 pixel, inout SurfacePoint p) {
-    DrawData d = load_draw(draw_data, id >> TRIANGLE_BITS);
-    uvec3 v = triangle_vertices(id, d);
-    vec3 c0 = clip_xyw(load_position(d, v.x)), c1 = clip_xyw(load_position(d, v.y)), c2 = clip_xyw(load_position(d, v.z));
+// By what barycentric coordinates at the upper left pixel of a quad differ from those beside and below it.
+struct QuadBarycentrics {
+    vec3 dx;
+    vec3 dy;
+};
+
+QuadBarycentrics quad_barycentrics(uvec2 pixel, vec3 p0, vec3 p1, vec3 p2) {
     uvec2 corner = pixel & ~1u;
-    vec3 at = barycentrics_at(ndc_from_pixel(corner), c0, c1, c2).at;
-    vec3 dx = barycentrics_at(ndc_from_pixel(corner + uvec2(1u, 0u)), c0, c1, c2).at - at;
-    vec3 dy = barycentrics_at(ndc_from_pixel(corner + uvec2(0u, 1u)), c0, c1, c2).at - at;
-    uvec3 a = v * 7u;
-    mat3x2 uv0 = mat3x2(load_uv(a.x, 2u), load_uv(a.y, 2u), load_uv(a.z, 2u));
-    p.uv0.ddx = uv0 * dx;
-    p.uv0.ddy = uv0 * dy;
-    if (HAS_UV1 != 0u) {
-        mat3x2 uv1 = mat3x2(load_uv(a.x, 4u), load_uv(a.y, 4u), load_uv(a.z, 4u));
-        p.uv1.ddx = uv1 * dx;
-        p.uv1.ddy = uv1 * dy;
-    }
+    vec3 at = barycentrics_at(ndc_from_pixel(corner), p0, p1, p2).at;
+    return QuadBarycentrics(barycentrics_at(ndc_from_pixel(corner + uvec2(1u, 0u)), p0, p1, p2).at - at,
+                            barycentrics_at(ndc_from_pixel(corner + uvec2(0u, 1u)), p0, p1, p2).at - at);
+}
+
+// Texture coordinates that stand at word `offset` of the attributes of three vertices.
+TextureCoordinates interpolate_uv(Barycentrics b, QuadBarycentrics quad, uvec3 first, uint offset) {
+    mat3x2 uv = mat3x2(load_uv(first.x, offset), load_uv(first.y, offset), load_uv(first.z, offset));
+    return TextureCoordinates(uv * b.at, uv * quad.dx, uv * quad.dy);
 }
 
 SurfacePoint triangle_point(uint id, vec2 ndc, out uint material) {
@@ -132,7 +111,9 @@ SurfacePoint triangle_point(uint id, vec2 ndc, out uint material) {
     material = d.material;
     uvec3 v = triangle_vertices(id, d);
     vec3 p0 = load_position(d, v.x), p1 = load_position(d, v.y), p2 = load_position(d, v.z);
-    Barycentrics b = barycentrics_at(ndc, clip_xyw(p0), clip_xyw(p1), clip_xyw(p2));
+    vec3 c0 = clip_xyw(p0), c1 = clip_xyw(p1), c2 = clip_xyw(p2);
+    Barycentrics b = barycentrics_at(ndc, c0, c1, c2);
+    QuadBarycentrics quad = quad_barycentrics(uvec2((ndc * 0.5 + 0.5) * vec2(frame.size_px)), c0, c1, c2);
 
     bool mirrored = (d.flags & DRAW_MIRRORED) != 0u;
     uvec3 a = v * 7u;
@@ -145,14 +126,8 @@ SurfacePoint triangle_point(uint id, vec2 ndc, out uint material) {
     if (NORMAL_BUCKETS > 0u) {
         p.tangent_ws = b.at.x * load_tangent(d, a.x, n0) + b.at.y * load_tangent(d, a.y, n1) + b.at.z * load_tangent(d, a.z, n2);
     }
-    p.uv0 = interpolate_uv(b, load_uv(a.x, 2u), load_uv(a.y, 2u), load_uv(a.z, 2u));
-    p.uv1 = p.uv0;
-    if (HAS_UV1 != 0u) {
-        p.uv1 = interpolate_uv(b, load_uv(a.x, 4u), load_uv(a.y, 4u), load_uv(a.z, 4u));
-    }
-    if (is_steep(1.0, b.inverse_w_change)) {
-        take_quad_gradients(id, uvec2((ndc * 0.5 + 0.5) * vec2(frame.size_px)), p);
-    }
+    p.uv0 = interpolate_uv(b, quad, a, 2u);
+    p.uv1 = HAS_UV1 != 0u ? interpolate_uv(b, quad, a, 4u) : p.uv0;
     p.color = vec4(1.0);
     if (HAS_VERTEX_COLOR != 0u) {
         p.color = b.at.x * unpackUnorm4x8(attributes[a.x + 6u]) + b.at.y * unpackUnorm4x8(attributes[a.y + 6u])

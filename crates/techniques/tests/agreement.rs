@@ -8,7 +8,7 @@ use afterlight_techniques::{
     scene::{Camera, Scene},
 };
 use afterlight_testkit::Need;
-use common::{Stage, covered, image_of, least_db, psnr, wider};
+use common::{Stage, compiled_variant, covered, image_of, least_db, params, psnr, wider};
 use glam::Vec3;
 
 /// Bytes that lavapipe (Mesa 22.3) binds at most.
@@ -207,4 +207,42 @@ fn on_an_empty_scene() {
     let gpu = afterlight_testkit::gpu();
     let stage = Stage::of(&gpu, Scene::default());
     all_agree(&stage, &stage.settings((20, 20), 0), "empty", 1);
+}
+
+/// Techniques that read a triangle's vertices choose the mip levels of a raster pass on surfaces seen at a flat angle: by the differences within a
+/// quad of pixels. Changes from each pixel to its neighbours are others.
+#[test]
+fn mip_levels_are_those_of_a_quad() {
+    const LEAST_DB: f64 = 58.0;
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=30000");
+    let camera = Camera::look_at(
+        "along the floor",
+        Vec3::new(-9.0, 0.12, 0.3),
+        Vec3::new(9.0, 0.5, -1.0),
+        80f32.to_radians(),
+        0.01,
+    );
+    let settings = stage.from(camera, (161, 91), 30);
+    let reference = stage.image(find("forward").unwrap(), &settings);
+    let own_corner = ("uvec2 corner = pixel & ~1u;", "uvec2 corner = pixel;");
+    for (id, shader, header, mutation) in [
+        ("visibility", "visibility/shade.comp", "triangle.glsl", own_corner),
+        (
+            "dais",
+            "dais/shade.comp#one",
+            "surfaces/triangles/interpolate.glsl",
+            ("2.0 * floor(0.5 * pixel) - pixel", "vec2(0.0)"),
+        ),
+    ] {
+        let technique = find(id).unwrap();
+        let raster = params(technique, &[("visibility", "raster")]);
+        let db = psnr(&reference, &image_of(&mut stage.prepare_with(technique, &settings, &raster)));
+        let mutant = compiled_variant(shader, header, &[mutation]);
+        let mutant = image_of(&mut stage.prepare_shaders(technique, &settings, &raster, [mutant]));
+        let mutant_db = psnr(&reference, &mutant);
+        println!("{id}: {db:.2} dB, changes of the pixel's own {mutant_db:.2} dB");
+        assert!(db >= LEAST_DB, "{id}: {db:.2} dB");
+        assert!(mutant_db < LEAST_DB, "{id}: a mutant within the bound: {mutant_db:.2} dB");
+    }
 }

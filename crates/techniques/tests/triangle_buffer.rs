@@ -555,7 +555,7 @@ fn errors(view: &View, triangles: &[Triangle], tangents: Tangents, found: &[f32]
             let exact = oracle.changes(a);
             let magnitude = exact[0].value.hypot(exact[1].value);
             shift.add(error, magnitude, slack);
-            let Some(exact) = expected_changes(view, t, &oracle, a) else { continue };
+            let Some(exact) = expected_changes(view, t, a) else { continue };
             let magnitude = exact[0].value.hypot(exact[1].value);
             for (k, exact) in exact.into_iter().enumerate() {
                 changes.add((found[8 + 2 * k + axis] - exact.value).abs(), magnitude, exact.slack);
@@ -565,19 +565,9 @@ fn errors(view: &View, triangles: &[Triangle], tangents: Tangents, found: &[f32]
     errors
 }
 
-/// `STEEP_CHANGE` of `material.glsl`.
-const STEEP_CHANGE: f64 = 0.125;
-
-/// Changes of an attribute a pixel: analytic ones; where 1/w changes by more than [`STEEP_CHANGE`] within the pixel, differences within its quad.
-/// None where rounding decides between the two, and where a pixel of the quad is so near the plane's horizon that first-order slack says
-/// nothing.
-fn expected_changes(view: &View, t: &Triangle, oracle: &Oracle, a: [f64; 3]) -> Option<[Exact; 2]> {
-    if oracle.sum_change < STEEP_CHANGE * 0.97 {
-        return Some(oracle.changes(a));
-    }
-    if oracle.sum_change < STEEP_CHANGE * 1.03 {
-        return None;
-    }
+/// Changes of an attribute a pixel: differences within its quad. None where a pixel of the quad is so near the plane's horizon that first-order
+/// slack says nothing.
+fn expected_changes(view: &View, t: &Triangle, a: [f64; 3]) -> Option<[Exact; 2]> {
     let corner = t.pixel.map(|place| place & !1);
     let value = |x, y| {
         let of_quad = Oracle::new(view, &Triangle { pixel: [corner[0] + x, corner[1] + y], ..*t })?;

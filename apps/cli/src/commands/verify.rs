@@ -100,6 +100,13 @@ fn text(verification: &Verification) -> String {
         verification.seconds,
         verification.off_count,
     );
+    if verification.undecided > 0 {
+        let _ = writeln!(
+            text,
+            "{} of them within their bounds but for pixels at edges and rims of masks, which Vulkan leaves open (one of 1,000 at most)",
+            grouped(verification.undecided),
+        );
+    }
     if *views < verification.views_asked {
         let _ = writeln!(text, "the time was up: {} views were asked for", verification.views_asked);
     }

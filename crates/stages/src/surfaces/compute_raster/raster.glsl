@@ -195,7 +195,6 @@ bool passes_alpha(RasterDraw d, uint triangle, ivec2 pixel) {
     uint material;
     uint id = d.draw << TRIANGLE_BITS | triangle;
     SurfacePoint p = triangle_point(id, ndc_from_pixel(uvec2(pixel)), material);
-    take_quad_gradients(id, uvec2(pixel), p);
     return base_color_at(load_material(material), p).a >= d.alpha_cutoff;
 #else
     return true;

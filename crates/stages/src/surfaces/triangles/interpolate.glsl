@@ -40,18 +40,11 @@ TextureCoordinates quad_uv(uint word, vec2 from_anchor_px, vec3 inverse_w, vec2 
                               uv_at(word, from_anchor_px, inverse_w, to_corner_px + vec2(0.0, 1.0)) - corner);
 }
 
-// The same with changes at the pixel's centre.
+// The same with changes at the pixel's centre: what tangents follow.
 TextureCoordinates analytic_uv(uint word, vec2 from_anchor_px, vec3 inverse_w, float w) {
     vec3 u = divided(record_affine(word, from_anchor_px), inverse_w, w);
     vec3 v = divided(record_affine(word + 3u, from_anchor_px), inverse_w, w);
     return TextureCoordinates(vec2(u.x, v.x), vec2(u.y, v.y), vec2(u.z, v.z));
-}
-
-TextureCoordinates interpolated_uv(uint word, vec2 from_anchor_px, vec3 inverse_w, float w, vec2 to_corner_px) {
-    if (is_steep(inverse_w.x, inverse_w.yz)) {
-        return quad_uv(word, from_anchor_px, inverse_w, to_corner_px);
-    }
-    return analytic_uv(word, from_anchor_px, inverse_w, w);
 }
 
 // World position at a pixel from the first three words.
@@ -159,8 +152,8 @@ SurfacePoint interpolated_point(uint index, vec2 pixel, out uint material) {
     p.position_ws = interpolated_position(first_words, center);
     p.front_facing = (triangle_buffer[record + 18u] & RECORD_FRONT) != 0u;
     vec2 to_corner = 2.0 * floor(0.5 * pixel) - pixel;
-    p.uv0 = interpolated_uv(record + 12u, from_anchor, inverse_w, w, to_corner);
-    p.uv1 = HAS_UV1 != 0u ? interpolated_uv(record + UV1_WORD, from_anchor, inverse_w, w, to_corner) : p.uv0;
+    p.uv0 = quad_uv(record + 12u, from_anchor, inverse_w, to_corner);
+    p.uv1 = HAS_UV1 != 0u ? quad_uv(record + UV1_WORD, from_anchor, inverse_w, to_corner) : p.uv0;
     p.color = vec4(1.0);
     if (HAS_VERTEX_COLOR != 0u) {
         for (uint i = 0u; i < 4u; ++i) {
