@@ -15,7 +15,7 @@ pub struct PassReport {
     /// Device time in nanoseconds from the end of the pass before to the end of this one, barriers included: the passes'
     /// times add up to the frame's. `None` where the device has no timestamps.
     pub time_ns: Option<f64>,
-    /// What the pipeline counted. `None` where the device has no statistics queries.
+    /// What the pipeline counted; `None` in a frame that does not count, and where the device has no statistics queries.
     pub statistics: Option<Statistics>,
     /// Whether it is work that techniques share by its role, reported apart.
     pub shared: bool,

@@ -207,7 +207,7 @@ fn a_chain_with_shared_memory_gives_the_right_pixels() {
     assert!(plan.dropped.is_empty() && plan.unused_slots.is_empty());
     let mut executor = Executor::new(&device, plan).expect("an executor");
     for run in 0..3 {
-        let report = executor.run().expect("a run");
+        let report = executor.run_counted().expect("a run");
         for (name, shift) in [("first/last", 3), ("shared/second/last", 200)] {
             let bytes = executor.read_image(name).expect("a kept image");
             assert_pixels(&bytes, shift, &format!("run {run}: {name}"));
@@ -402,7 +402,7 @@ fn a_tessellated_triangle_is_counted() {
     let plan = g.plan(&device).expect("a valid frame");
     let mut executor = Executor::new(&device, plan).expect("an executor");
     for _ in 0..2 {
-        let report = executor.run().expect("a run");
+        let report = executor.run_counted().expect("a run");
         let bytes = executor.read_buffer("count").expect("kept");
         assert_eq!(bytes, (24u32 * 3).to_ne_bytes());
         let statistics = report.pass("patches").and_then(|pass| pass.statistics).expect("statistics");

@@ -200,12 +200,12 @@ struct Trial {
 }
 
 impl Trial {
-    /// Prepares a technique and draws a warm-up frame.
+    /// Prepares a technique and draws a warm-up frame, which counts what passes do: measured frames do not, since that takes time.
     fn start(renderer: &Renderer, chosen: &Chosen) -> Result<Trial, TechniqueError> {
         let start = Instant::now();
         let mut prepared = renderer.prepare(chosen.technique, &chosen.params)?;
         let prepare_ms = ms_since(start);
-        let warm_up = prepared.run()?;
+        let warm_up = prepared.run_counted()?;
         Ok(Trial { prepared, prepare_ms, warm_up, reports: Vec::new() })
     }
 
@@ -218,6 +218,7 @@ impl Trial {
     /// Figures of the measured frames, or of the warm-up frame where there are none, and the image.
     fn finish(self, chosen: &Chosen, workload: &Workload) -> Result<Measured, TechniqueError> {
         let Trial { mut prepared, prepare_ms, warm_up, mut reports } = self;
+        let counted: Vec<_> = warm_up.passes.iter().map(|pass| pass.statistics).collect();
         if reports.is_empty() {
             reports.push(warm_up);
         }
@@ -226,7 +227,7 @@ impl Trial {
         result.params = params_record(chosen);
         result.frame_ms = spread_ns(&reports, |report| report.frame_ns);
         result.record_ms = spread_ns(&reports, |report| Some(report.cpu_record_ns as f64));
-        result.passes = passes(&reports, prepared.executor().plan());
+        result.passes = passes(&reports, &counted, prepared.executor().plan());
         result.memory = reports.last().map(memory);
         result.counters.insert("draws".to_owned(), prepared.draw_calls.into());
         result.counters.insert("prepare_ms".to_owned(), Value::from(prepare_ms));
@@ -271,7 +272,8 @@ fn spread_ns(reports: &[FrameReport], value: impl Fn(&FrameReport) -> Option<f64
     Spread::of(&samples_ms)
 }
 
-fn passes(reports: &[FrameReport], plan: &Plan) -> Vec<Pass> {
+/// Passes with their times in all frames, and what they counted in one.
+fn passes(reports: &[FrameReport], counted: &[Option<Statistics>], plan: &Plan) -> Vec<Pass> {
     let Some(last) = reports.last() else { return Vec::new() };
     last.passes
         .iter()
@@ -285,7 +287,7 @@ fn passes(reports: &[FrameReport], plan: &Plan) -> Vec<Pass> {
                 ms: spread_ns(reports, |report| report.passes.get(index)?.time_ns),
                 reads,
                 writes,
-                statistics: pass.statistics.as_ref().map(statistics).unwrap_or_default(),
+                statistics: counted.get(index).and_then(Option::as_ref).map(statistics).unwrap_or_default(),
             }
         })
         .collect()

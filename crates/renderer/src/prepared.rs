@@ -210,6 +210,14 @@ impl Prepared {
         Ok(self.executor.run()?)
     }
 
+    /// The same, where passes count what the pipeline does in them; that takes time on the device.
+    ///
+    /// # Errors
+    /// The device.
+    pub fn run_counted(&mut self) -> Result<FrameReport, TechniqueError> {
+        Ok(self.executor.run_counted()?)
+    }
+
     /// The last frame, tone-mapped, sRGB, RGBA with 8 bits a channel, rows from the top.
     ///
     /// # Errors

@@ -22,7 +22,7 @@ fn rendered(
 ) -> (Rgba8Image, f64) {
     let technique = find("hybrid").expect("there");
     let mut prepared = stage.prepare_shaders(technique, settings, &params(technique, sets), shader);
-    let report = prepared.run().unwrap_or_else(|e| panic!("{e}"));
+    let report = prepared.run_counted().unwrap_or_else(|e| panic!("{e}"));
     let vertices = |pass: &str| {
         let pass = report.passes.iter().find(|p| p.name == pass).expect("a pass");
         pass.statistics.expect("statistics").vertex_invocations as f64

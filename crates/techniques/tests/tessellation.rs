@@ -301,7 +301,7 @@ fn cracks_are_caught() {
 /// Triangles of the pass `forward/shade` that reached clipping.
 fn triangles(stage: &Stage, settings: &Settings) -> u64 {
     let mut prepared = stage.prepare(find("forward").unwrap(), settings);
-    let report = prepared.run().unwrap_or_else(|e| panic!("{e}"));
+    let report = prepared.run_counted().unwrap_or_else(|e| panic!("{e}"));
     report.pass("forward/shade").and_then(|pass| pass.statistics).expect("statistics").clipping_invocations
 }
 
@@ -335,7 +335,8 @@ fn triangles_have_the_size_asked_for() {
     let forward = find("forward").unwrap();
     let none = params(forward, &[("cull", "none")]);
     let settings = tessellated(&stage.from(away, (64, 36), 0), 1, 1.0, 1e-3 * MAX_DISPLACEMENT_MM);
-    let report = stage.prepare_with(forward, &settings, &none).run().unwrap_or_else(|e| panic!("{e}"));
+    let report =
+        stage.prepare_with(forward, &settings, &none).run_counted().unwrap_or_else(|e| panic!("{e}"));
     let statistics = report.pass("forward/shade").and_then(|pass| pass.statistics).expect("statistics");
     assert!(statistics.input_primitives > 0, "{statistics:?}");
     assert_eq!(statistics.clipping_invocations, 0, "patches out of view are divided");

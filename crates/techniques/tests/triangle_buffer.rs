@@ -730,7 +730,7 @@ fn no_more_threads_start_than_triangles_show() {
     for (id, samples) in [("dais", 1), ("dais-list", 4)] {
         let settings = Settings { samples, ..stage.settings((160, 90), 0) };
         let mut prepared = stage.prepare(find(id).expect("known"), &settings);
-        let report = prepared.run().unwrap_or_else(|e| panic!("{e}"));
+        let report = prepared.run_counted().unwrap_or_else(|e| panic!("{e}"));
         let counters = prepared.counters().unwrap_or_else(|e| panic!("{e}"));
         let shown = u64::from(counters.iter().find(|c| c.name == "triangles").expect("counted").needed);
         let threads = |pass: &str| {

@@ -16,7 +16,7 @@ pub use params::{IndexParts, LightIndexParams};
 /// What both techniques keep of the lights.
 pub const EXACTNESS: Exactness = Exactness::Approximate {
     bound: "of the lights with an end that reach a pixel's surface the four nearest, by the view distance of their centres; exact where no more than four do",
-    min_psnr_db: 6.0,
+    min_psnr_db: 5.0,
 };
 
 /// Values of a part: `PART_VALUES` of `parts.glsl`.
