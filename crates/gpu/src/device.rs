@@ -167,6 +167,11 @@ impl Device {
         })))
     }
 
+    /// Pipelines that were made so far. They are kept: what was asked for once is there.
+    pub fn pipeline_count(&self) -> usize {
+        self.0.pipelines.count()
+    }
+
     /// Which device it is.
     pub fn info(&self) -> &DeviceInfo {
         &self.0.info

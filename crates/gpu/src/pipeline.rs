@@ -334,6 +334,10 @@ impl PipelineStore {
             .map_err(|e| GpuError::CacheFile { path: path.display().to_string(), reason: e.to_string() })
     }
 
+    pub fn count(&self) -> usize {
+        lock(&self.made).len()
+    }
+
     /// # Safety
     /// No pipeline may be in use any more.
     pub unsafe fn destroy(&self, device: &ash::Device) {

@@ -151,7 +151,11 @@ fn a_view_that_needs_far_more_than_the_last_is_drawn_again_or_told() {
         let renderer = renderer.unwrap_or_else(|e| panic!("{e}"));
         let mut flight =
             renderer.fly(technique, &params, &nothing, options()).unwrap_or_else(|e| panic!("{id}: {e}"));
+        let pipelines = gpu.pipeline_count();
         let (pictures, events) = flown(&mut flight, still(&cameras));
+        if id == "dais" {
+            assert_eq!(gpu.pipeline_count(), pipelines, "a triangle buffer that grows makes pipelines anew");
+        }
         let alone = alone(&stage, technique, &params, samples, &cameras);
         let off: Vec<_> =
             unlike(&pictures, &alone).into_iter().filter(|(_, db)| *db < UNORDERED_DB).collect();

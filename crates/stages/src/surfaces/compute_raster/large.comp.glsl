@@ -15,7 +15,6 @@ layout(set = 0, binding = 10, scalar) readonly buffer TileJobs {
 layout(set = 0, binding = 15, scalar) readonly buffer ClippedTriangles {
     ClippedTriangle clipped_triangles[];
 };
-layout(constant_id = 11) const uint JOB_CAPACITY = 0u;
 
 const int BLOCK_PX = 8;
 
@@ -26,7 +25,7 @@ int steps_within(int64_t at, int least) {
 }
 
 void main() {
-    uint count = min(jobs_needed, JOB_CAPACITY);
+    uint count = min(jobs_needed, uint(tile_jobs.length()));
     for (uint place = gl_WorkGroupID.x; place < count; place += gl_NumWorkGroups.x) {
         uvec2 job = tile_jobs[place];
         bool is_clipped = (job.y & CLIPPED_JOB) != 0u;

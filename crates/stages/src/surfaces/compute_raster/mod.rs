@@ -93,9 +93,7 @@ pub fn rasterize(
     // One pass for opaque and masked surfaces: a few slow threads of alpha tests then have company.
     let shader = frame.shader(&variant("surfaces/compute_raster/triangles.comp"))?;
     let mut pass = frame.compute(graph, &name("triangles"), PassRole::Geometry, &shader);
-    pass.constant("SAMPLES", samples)
-        .constant("LARGE_CAPACITY", large_capacity)
-        .constant("SMALL_PX", small_px);
+    pass.constant("SAMPLES", samples).constant("SMALL_PX", small_px);
     pass.read("DrawCommands", &frame.buffers.commands).read("DrawCounts", &frame.buffers.command_counts);
     let keys = pass.write("SampleKeys", keys);
     let large = pass.write("LargeTriangles", large);
@@ -118,9 +116,6 @@ pub fn rasterize(
         PassRole::Geometry,
         &frame.shader("surfaces/compute_raster/bin.comp")?,
     );
-    pass.constant("LARGE_CAPACITY", large_capacity)
-        .constant("JOB_CAPACITY", job_capacity)
-        .constant("CLIPPED_CAPACITY", clipped_capacity);
     pass.read("DrawCommands", &frame.buffers.commands);
     pass.read("LargeTriangles", &large);
     let jobs = pass.write("TileJobs", jobs);
@@ -131,7 +126,7 @@ pub fn rasterize(
 
     let shader = frame.shader(&variant("surfaces/compute_raster/large.comp"))?;
     let mut pass = frame.compute(graph, &name("large triangles"), PassRole::Geometry, &shader);
-    pass.constant("SAMPLES", samples).constant("JOB_CAPACITY", job_capacity);
+    pass.constant("SAMPLES", samples);
     pass.read("DrawCommands", &frame.buffers.commands).read("TileJobs", &jobs).read("QueueCounts", &counts);
     pass.read("ClippedTriangles", &clipped);
     let keys = pass.write("SampleKeys", keys);

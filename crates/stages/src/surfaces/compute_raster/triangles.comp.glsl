@@ -17,7 +17,6 @@ layout(set = 0, binding = 11, scalar) writeonly buffer LargeTriangles {
 };
 #define QUEUE_ACCESS
 #include "surfaces/compute_raster/queue_counts.glsl"
-layout(constant_id = 10) const uint LARGE_CAPACITY = 0u;
 layout(push_constant, scalar) uniform Push {
     uint bucket;
     uint first_command;     // of the bucket
@@ -100,7 +99,7 @@ void main() {
         rasterize_small(t, first, last, order, d);
     } else {
         uint slot = atomicAdd(large_needed, 1u);
-        if (slot < LARGE_CAPACITY) {
+        if (slot < uint(large_triangles.length())) {
             large_triangles[slot] = order;
         } else {
             atomicAdd(large_dropped, 1u);

@@ -41,7 +41,6 @@ layout(set = 0, binding = 9, scalar) readonly buffer DrawCommands {
     uint draw_commands[];
 };
 #endif
-layout(constant_id = 11) const uint TRIANGLE_CAPACITY = 0u;
 
 // Affine functions on the screen: value at the anchor, changes a pixel.
 struct Affine {
@@ -237,7 +236,7 @@ void store_record(uint record, TriangleVertices t) {
 
 void main() {
     uint index = group_number() * GROUP_TRIANGLES + gl_LocalInvocationID.x;
-    if (index >= min(triangles_needed, TRIANGLE_CAPACITY)) {
+    if (index >= min(triangles_needed, record_room(triangle_buffer.length()))) {
         return;
     }
     uint record = index * RECORD_WORDS;

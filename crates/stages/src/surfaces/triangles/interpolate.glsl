@@ -112,17 +112,14 @@ void find_frame(uint record, vec2 from_anchor_px, vec2 pixel_center, vec3 first_
     }
 }
 
-// Records that there is room for. The buffer may be longer: its memory is rounded up.
-layout(constant_id = 25) const uint RECORD_CAPACITY = 0u;
-
 // Whether a triangle found room. In a frame that has more triangles than room, some have no record.
 bool has_record(uint index) {
-    return index < RECORD_CAPACITY;
+    return index < record_room(triangle_buffer.length());
 }
 
 // First word of a record; of one that is not there, that of the last.
 uint record_at(uint index) {
-    return min(index, uint(triangle_buffer.length()) / RECORD_WORDS - 1u) * RECORD_WORDS;
+    return min(index, record_room(triangle_buffer.length()) - 1u) * RECORD_WORDS;
 }
 
 // `pixel` is a place in pixels, whole at pixel centres.

@@ -99,7 +99,6 @@ impl Records {
     pub fn bind(&self, pass: &mut (impl SourceSlots + ?Sized)) {
         pass.read_buffer("TriangleBuffer", &self.words);
         set_constants(pass, self.layout.constants());
-        set_constants(pass, [("RECORD_CAPACITY", self.capacity)]);
     }
 }
 
@@ -160,8 +159,7 @@ impl List {
     /// Specialization constants of the fragments that append to it.
     pub fn constants(&self) -> Vec<(String, u32)> {
         let of_layout = self.layout.constants();
-        let all = of_layout.iter().copied().chain([("TRIANGLE_CAPACITY", self.capacity)]);
-        all.map(|(name, value)| (name.to_owned(), value)).collect()
+        of_layout.iter().copied().map(|(name, value)| (name.to_owned(), value)).collect()
     }
 
     /// Binds it to the pass that appends.
@@ -186,7 +184,7 @@ impl List {
         let shader = frame.shader("surfaces/triangles/size.comp")?;
         let mut pass =
             frame.compute(graph, &format!("{technique}/size"), PassRole::TriangleSelection, &shader);
-        pass.constant("TRIANGLE_CAPACITY", self.capacity);
+        pass.push(&self.capacity);
         pass.read("TriangleCount", &self.count);
         let groups = pass.write("DispatchGroups", groups);
         pass.dispatch([1, 1, 1]);
@@ -198,7 +196,6 @@ impl List {
             frame.shader(&format!("surfaces/triangles/derivatives.comp#{stored}{}", ids.tag('-')))?;
         let mut pass =
             frame.compute(graph, &format!("{technique}/derivatives"), PassRole::Derivatives, &shader);
-        pass.constant("TRIANGLE_CAPACITY", self.capacity);
         set_constants(&mut pass, self.layout.constants());
         pass.read("TriangleCount", &self.count);
         let words = pass.write("TriangleBuffer", self.records);
@@ -326,7 +323,7 @@ pub fn store_marked(
         PassRole::TriangleSelection,
         &frame.shader("surfaces/triangles/scan.comp")?,
     );
-    pass.constant("BLOCKS", blocks).constant("TRIANGLE_CAPACITY", capacity);
+    pass.constant("BLOCKS", blocks).push(&capacity);
     pass.read("VisibleOfBlock", &of_block);
     let base = pass.write("BlockBaseOut", base);
     let count = pass.write("TriangleCount", count);
@@ -338,7 +335,7 @@ pub fn store_marked(
     let tag = if by_keys { format!("#keys{}", ids.tag('-')) } else { ids.tag('#') };
     let shader = frame.shader(&format!("surfaces/triangles/derivatives.comp{tag}"))?;
     let mut pass = frame.compute(graph, &name("derivatives"), PassRole::Derivatives, &shader);
-    pass.constant("TRIANGLE_CAPACITY", capacity).constant("DRAWS", draws);
+    pass.constant("DRAWS", draws);
     set_constants(&mut pass, layout.constants());
     pass.read("TriangleCount", &count);
     pass.read("VisibleBits", &bits).read("VisibleBefore", &before).read("BlockBase", &base);

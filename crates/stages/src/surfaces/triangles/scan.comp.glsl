@@ -22,7 +22,10 @@ layout(set = 0, binding = 11, scalar) writeonly buffer DispatchGroups {
     uvec3 dispatch_groups;
 };
 layout(constant_id = 10) const uint BLOCKS = 0u;
-layout(constant_id = 11) const uint TRIANGLE_CAPACITY = 0u;
+// No specialization constant: a buffer that grows makes no pipeline anew.
+layout(push_constant, scalar) uniform Push {
+    uint triangle_capacity;
+};
 
 void main() {
     uvec2 blocks = elements_of_thread(BLOCKS);
@@ -38,7 +41,7 @@ void main() {
     }
     if (gl_LocalInvocationID.x == 0u) {
         triangles_needed = total;
-        triangles_dropped = max(total, TRIANGLE_CAPACITY) - TRIANGLE_CAPACITY;
-        dispatch_groups = derivative_groups(min(total, TRIANGLE_CAPACITY));
+        triangles_dropped = max(total, triangle_capacity) - triangle_capacity;
+        dispatch_groups = derivative_groups(min(total, triangle_capacity));
     }
 }

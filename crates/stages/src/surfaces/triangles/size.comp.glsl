@@ -12,8 +12,11 @@ layout(set = 0, binding = 8, scalar) readonly buffer TriangleCount {
 layout(set = 0, binding = 9, scalar) writeonly buffer DispatchGroups {
     uvec3 dispatch_groups;
 };
-layout(constant_id = 11) const uint TRIANGLE_CAPACITY = 0u;
+// No specialization constant: a buffer that grows makes no pipeline anew.
+layout(push_constant, scalar) uniform Push {
+    uint triangle_capacity;
+};
 
 void main() {
-    dispatch_groups = derivative_groups(min(triangles_needed, TRIANGLE_CAPACITY));
+    dispatch_groups = derivative_groups(min(triangles_needed, triangle_capacity));
 }
