@@ -20,6 +20,7 @@ mod inputs;
 pub mod scene;
 mod settings;
 mod slots;
+pub mod sort_words;
 mod technique;
 pub mod upload;
 pub mod views;

@@ -107,7 +107,7 @@ pub struct Finding {
     pub margin_db: Option<f64>,
     /// Pixels whose greatest difference of a channel is 4 or more of 255; pixels that the ray caster found off, for the reference.
     pub pixels_off: u64,
-    /// Pixels whose surface Vulkan leaves open and which were left out when the image missed its bound with them.
+    /// Pixels whose surface Vulkan leaves open, without which the image keeps its bound; 0 where it keeps it with them, or not at all.
     #[serde(default)]
     pub pixels_undecided: u64,
     /// The command that repeats exactly this.

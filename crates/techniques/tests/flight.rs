@@ -153,9 +153,9 @@ fn a_view_that_needs_far_more_than_the_last_is_drawn_again_or_told() {
             renderer.fly(technique, &params, &nothing, options()).unwrap_or_else(|e| panic!("{id}: {e}"));
         let pipelines = gpu.pipeline_count();
         let (pictures, events) = flown(&mut flight, still(&cameras));
-        if id == "dais" {
-            assert_eq!(gpu.pipeline_count(), pipelines, "a triangle buffer that grows makes pipelines anew");
-        }
+        let made = gpu.pipeline_count() - pipelines;
+        println!("{id}: growth made {made} pipelines");
+        assert!(id != "dais" || made == 0, "a triangle buffer that grows makes {made} pipelines anew");
         let alone = alone(&stage, technique, &params, samples, &cameras);
         let off: Vec<_> =
             unlike(&pictures, &alone).into_iter().filter(|(_, db)| *db < UNORDERED_DB).collect();

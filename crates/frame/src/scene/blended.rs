@@ -10,6 +10,7 @@ use crate::scene::{
     DrawInfo,
     draw_list::{DrawCommand, Frustum, displaced},
 };
+use crate::sort_words::{greatest_first, place_of};
 
 /// What the CPU keeps of a scene's draws with alpha blending.
 #[derive(Clone)]
@@ -21,6 +22,8 @@ pub struct Blended {
     centroids_ws: Vec<Vec3>,
     /// Their corners, counted from the first vertex of their draw.
     corners: Arc<[[u32; 3]]>,
+    /// The draw of each, by its place in `draws`.
+    draw_of: Arc<[u32]>,
 }
 
 #[derive(Clone)]
@@ -71,7 +74,7 @@ impl Blended {
         infos: Vec<DrawInfo>,
         first_number: usize,
     ) -> Self {
-        let (mut draws, mut all_corners) = (Vec::new(), Vec::new());
+        let (mut draws, mut all_corners, mut draw_of) = (Vec::new(), Vec::new(), Vec::new());
         let (mut centroids_os, mut centroids_ws) = (Vec::new(), Vec::new());
         for (k, (record, info)) in records.iter().zip(&infos).enumerate() {
             let first = all_corners.len();
@@ -82,6 +85,7 @@ impl Blended {
                 centroids_ws.push(to_world(record, sum_os / 3.0));
                 all_corners.push([corners[0], corners[1], corners[2]]);
             }
+            draw_of.resize(all_corners.len(), k as u32);
             draws.push(BlendedDraw {
                 number: (first_number + k) as u32,
                 bounds_ws: info.bounds_ws,
@@ -89,7 +93,13 @@ impl Blended {
                 triangles: first..all_corners.len(),
             });
         }
-        Self { draws, centroids_os: centroids_os.into(), centroids_ws, corners: all_corners.into() }
+        Self {
+            draws,
+            centroids_os: centroids_os.into(),
+            centroids_ws,
+            corners: all_corners.into(),
+            draw_of: draw_of.into(),
+        }
     }
 
     /// Moves a draw, by its place among those with alpha blending, to where its record says, within these bounds.
@@ -119,30 +129,34 @@ impl Blended {
             let reached = displaced(&draw.bounds_ws, view.displacement_m);
             frustum.as_ref().is_none_or(|frustum| frustum.touches(&reached))
         };
-        let visible: Vec<&BlendedDraw> = self.draws.iter().filter(|draw| in_view(draw)).collect();
+        let visible: Vec<usize> =
+            (0..self.draws.len()).filter(|place| in_view(&self.draws[*place])).collect();
         let distance = |p: Vec3| view.distance_from_world.dot(p.extend(1.0));
         let mut ordered = Ordered { draw_count: visible.len() as u32, ..Ordered::default() };
         if self.triangle_count() > view.triangles_max {
-            let runs = visible.iter().map(|draw| (distance(draw.bounds_ws.center()), *draw)).collect();
-            for draw in back_to_front(runs) {
+            let of_draw = |place: usize| (distance(self.draws[place].bounds_ws.center()), place);
+            for place in back_to_front(visible.into_iter().map(of_draw)) {
+                let draw = &self.draws[place];
                 ordered.push(draw, &self.corners[draw.triangles.clone()]);
             }
             return ordered;
         }
-        let triangles = visible.iter().flat_map(|draw| {
-            draw.triangles.clone().map(|triangle| (distance(self.centroids_ws[triangle]), (*draw, triangle)))
-        });
-        for (draw, triangle) in back_to_front(triangles.collect()) {
+        let triangles = visible.into_iter().flat_map(|place| self.draws[place].triangles.clone());
+        let of_triangle = |triangle: usize| (distance(self.centroids_ws[triangle]), triangle);
+        for triangle in back_to_front(triangles.map(of_triangle)) {
+            let draw = &self.draws[self.draw_of[triangle] as usize];
             ordered.push(draw, &self.corners[triangle..=triangle]);
         }
         ordered
     }
 }
 
-/// Sorts from the greatest distance to the least; equal ones keep their order.
-fn back_to_front<T>(mut keyed: Vec<(f32, T)>) -> impl Iterator<Item = T> {
-    keyed.sort_by(|a, b| b.0.total_cmp(&a.0));
-    keyed.into_iter().map(|(_, one)| one)
+/// Places from the greatest distance to the least; those of equal ones in their own order.
+fn back_to_front(keyed: impl Iterator<Item = (f32, usize)>) -> impl Iterator<Item = usize> {
+    let mut words: Vec<u64> =
+        keyed.map(|(distance_m, place)| greatest_first(distance_m, place as u32)).collect();
+    words.sort_unstable();
+    words.into_iter().map(|word| place_of(word) as usize)
 }
 
 fn to_world(record: &DrawData, p_os: Vec3) -> Vec3 {
@@ -177,7 +191,7 @@ mod tests {
     /// Draws whose triangles have their centroids at those distances, m; corners are numbered through a draw.
     fn blended(draws: &[&[f32]]) -> Blended {
         let (mut blended, mut corners) = (Vec::new(), Vec::new());
-        let mut centroids_ws = Vec::new();
+        let (mut centroids_ws, mut draw_of) = (Vec::new(), Vec::new());
         for (number, distances_m) in (10..).zip(draws) {
             let first = corners.len();
             let mut bounds_ws = Aabb::EMPTY;
@@ -188,10 +202,12 @@ mod tests {
                 corners.push([3 * t, 3 * t + 1, 3 * t + 2]);
             }
             let triangles = first..corners.len();
+            draw_of.resize(corners.len(), blended.len() as u32);
             blended.push(BlendedDraw { number, bounds_ws, first_vertex: 100 * number, triangles });
         }
         let centroids_os = centroids_ws.clone().into();
-        Blended { draws: blended, centroids_os, centroids_ws, corners: corners.into() }
+        let (corners, draw_of) = (corners.into(), draw_of.into());
+        Blended { draws: blended, centroids_os, centroids_ws, corners, draw_of }
     }
 
     fn view(triangles_max: usize) -> ViewOrder {

@@ -102,8 +102,8 @@ impl Executor {
         Ok(Marks { times, statistics })
     }
 
-    /// Records the frame, runs it, waits for it, and reports what it took. It counts nothing, so that its times are those of a frame in a
-    /// program: queries around every pass have cost 16% of a frame of 1.1 ms on an NVIDIA H200.
+    /// Records the frame, runs it, waits for it, and reports what it took. It counts nothing, as a frame of a
+    /// program does not: queries around every pass are work of the device.
     ///
     /// # Errors
     /// The device was lost, or refuses the recording.

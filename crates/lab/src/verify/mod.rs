@@ -21,9 +21,10 @@ use afterlight_oracle::raster::RayScene;
 use afterlight_renderer::{Prepared, Renderer};
 use afterlight_scene::Scene;
 use afterlight_scene::rng::SplitMix64;
-use afterlight_techniques::{Counter, Indirect, Post, Settings, Shadows, TechniqueError};
+use afterlight_techniques::{Counter, Indirect, Settings, Shadows, TechniqueError};
 
 use command::{changed, compare_command};
+use undecided::{Settled, settle};
 use variants::{Variant, variants};
 pub use view::Fixed;
 use view::{Stage, View, draw};
@@ -274,14 +275,15 @@ impl Check<'_> {
             Some(Difference { psnr_db: psnr, max_abs: max_abs(truth, &image)?.into(), flip: None });
         finding.pixels_off = pixels_off(truth, &image, MARKED_FROM)?;
         let mut reason = dropped;
-        if reason.is_none() && psnr < bound_db {
-            let settled_db = self.settled_db(view, &image, truth, &mut finding.pixels_undecided)?;
-            match settled_db {
-                Some(settled_db) if settled_db >= bound_db => {
-                    self.found.undecided += 1;
-                    margin_db = settled_db.min(PSNR_IDENTICAL_DB) - bound_db;
-                }
-                _ => reason = shortfall(REFERENCE, psnr, bound_db),
+        if reason.is_none() {
+            reason = shortfall(REFERENCE, psnr, bound_db);
+            if reason.is_some()
+                && let Some(settled) = self.settled(view, renderer.settings(), (truth, &image), bound_db)?
+            {
+                reason = None;
+                margin_db = settled.psnr_db.min(PSNR_IDENTICAL_DB) - bound_db;
+                finding.pixels_undecided = settled.pixels;
+                self.found.undecided += 1;
             }
         }
         finding.margin_db = Some(margin_db);
@@ -297,23 +299,17 @@ impl Check<'_> {
         Ok(())
     }
 
-    /// PSNR of an image without its worst pixels that no rule decides, and how many these are; `None` where rays cannot tell them: with
-    /// several samples a pixel, with a filter that spreads a pixel over others, and without rays.
-    fn settled_db(
+    /// An image that keeps its bound without pixels that no rule decides; `None` where it does not, and where rays cannot tell: with several
+    /// samples a pixel, and without rays.
+    fn settled(
         &self,
         view: &View,
-        image: &Rgba8Image,
-        truth: &Rgba8Image,
-        pixels: &mut u64,
-    ) -> Result<Option<f64>, LabError> {
+        settings: &Settings,
+        images: (&Rgba8Image, &Rgba8Image),
+        bound_db: f64,
+    ) -> Result<Option<Settled>, LabError> {
         let Some(rays) = self.rays.as_ref().filter(|_| view.spec.samples == 1) else { return Ok(None) };
-        if view.spec.effects.post.filter != Post::None {
-            return Ok(None);
-        }
-        let camera = settings_of(self.scene, &view.spec)?.camera;
-        let (settled, taken) = undecided::settled(rays, &camera, truth, image);
-        *pixels = taken;
-        Ok(Some(psnr_db(truth, &settled)?))
+        Ok(settle(rays, &settings.camera, images, bound_db)?)
     }
 
     /// Has rays judge pixels of the reference at one sample, without shadows and indirect light, which rays do not see.

@@ -5,7 +5,7 @@
 //! without a fault of any technique. So an image that misses its bound is looked at again without its worst such pixels, and passes if
 //! they are few; how many passed so is told.
 
-use afterlight_image::Rgba8Image;
+use afterlight_image::{ImageError, Rgba8Image, psnr_db};
 use afterlight_oracle::{raster::RayScene, sight::Judge};
 use afterlight_scene::Camera;
 
@@ -14,29 +14,50 @@ use super::MARKED_FROM;
 /// Pixels that may be left out of a comparison are at most one of so many: faults of techniques at edges and masks show in more.
 const ONE_OF: usize = 1000;
 
-/// An image with `truth`'s pixels in place of those that no rule decides, the worst of them first, and how many these are.
-pub fn settled(
+/// An image that keeps its bound without some pixels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settled {
+    /// PSNR without them, dB.
+    pub psnr_db: f64,
+    /// How many were left out.
+    pub pixels: u64,
+}
+
+/// Leaves out the worst pixels of an image that no rule decides; `None` where it misses its bound without them as well.
+///
+/// # Errors
+/// Images of different sizes.
+pub fn settle(
     rays: &RayScene<'_>,
     camera: &Camera,
-    truth: &Rgba8Image,
-    image: &Rgba8Image,
-) -> (Rgba8Image, u64) {
-    let judge = Judge::new(rays, camera, [image.width, image.height]);
+    (truth, image): (&Rgba8Image, &Rgba8Image),
+    bound_db: f64,
+) -> Result<Option<Settled>, ImageError> {
+    let worst = worst_first(truth, image);
     let most = (image.pixels.len() / 4).div_ceil(ONE_OF);
-    let mut settled = image.clone();
-    let mut taken = 0;
-    for place in worst_first(truth, image) {
-        if taken == most {
-            break;
-        }
-        let pixel = [place as u32 % image.width, place as u32 / image.width];
-        // Where rounding moves surfaces by whole pixels rays say nothing, and nothing is left out.
-        if judge.sight(pixel).is_some_and(|sight| !sight.is_decided()) {
-            settled.pixels[4 * place..4 * place + 4].copy_from_slice(&truth.pixels[4 * place..4 * place + 4]);
-            taken += 1;
-        }
+    let without_db = |places: &[usize]| psnr_db(truth, &without(truth, image, places));
+    // A wholly other image costs no ray.
+    if without_db(&worst[..worst.len().min(most)])? < bound_db {
+        return Ok(None);
     }
-    (settled, taken as u64)
+    let judge = Judge::new(rays, camera, [image.width, image.height]);
+    // Where rounding moves surfaces by whole pixels rays say nothing, and nothing is left out.
+    let is_open = |place: &usize| {
+        let pixel = [*place as u32 % image.width, *place as u32 / image.width];
+        judge.sight(pixel).is_some_and(|sight| !sight.is_decided())
+    };
+    let open: Vec<usize> = worst.into_iter().filter(is_open).take(most).collect();
+    let settled = Settled { psnr_db: without_db(&open)?, pixels: open.len() as u64 };
+    Ok((settled.psnr_db >= bound_db).then_some(settled))
+}
+
+/// An image with `truth`'s pixels at some places.
+fn without(truth: &Rgba8Image, image: &Rgba8Image, places: &[usize]) -> Rgba8Image {
+    let mut left = image.clone();
+    for at in places.iter().map(|place| 4 * place..4 * place + 4) {
+        left.pixels[at.clone()].copy_from_slice(&truth.pixels[at]);
+    }
+    left
 }
 
 /// Places of pixels that differ to be seen, those that differ most first.
@@ -82,12 +103,20 @@ mod tests {
             all.into_iter().partition(|pixel| judge.sight(*pixel).is_some_and(|sight| sight.is_decided()));
         assert!(open.len() > 6 && decided.len() > 4000, "{} open, {} decided", open.len(), decided.len());
         let black = white_at(&[]);
-        let left = |pixels: &[[u32; 2]]| settled(&rays, camera, &black, &white_at(pixels));
-        assert_eq!(left(&open[..3]), (black.clone(), 3));
-        assert_eq!(left(&decided[..3]), (white_at(&decided[..3]), 0));
+        let settle_at = |pixels: &[[u32; 2]], bound_db: f64| {
+            settle(&rays, camera, (&black, &white_at(pixels)), bound_db).expect("images of one size")
+        };
+        // White pixels that are left, as a bound that is just kept.
+        let of_white = |pixels: &[[u32; 2]]| psnr_db(&black, &white_at(pixels)).expect("images of one size");
+        let all_open = settle_at(&open[..3], 200.0).expect("nothing is left");
+        assert_eq!((all_open.pixels, all_open.psnr_db), (3, f64::INFINITY));
+        assert_eq!(settle_at(&decided[..3], of_white(&decided[..3]) + 0.01), None);
+        let mixed = [&open[..3], &decided[..3]].concat();
+        assert_eq!(settle_at(&mixed, of_white(&decided[..3]) + 0.01), None);
+        assert_eq!(settle_at(&mixed, of_white(&decided[..3]) - 0.01).map(|settled| settled.pixels), Some(3));
         // 6 of 5,184 is one of 1,000, rounded up; the others stay.
-        let (image, taken) = left(&open);
-        assert_eq!(taken, 6);
-        assert_eq!(image, white_at(&open[6..]));
+        let left_db = of_white(&open[6..]);
+        assert_eq!(settle_at(&open, left_db), Some(Settled { psnr_db: left_db, pixels: 6 }));
+        assert_eq!(settle_at(&open, left_db + 0.01), None);
     }
 }

@@ -124,12 +124,12 @@ static INFO: Info = Info {
         resolve: "once a triangle",
     },
     appendix_a: APPENDIX_A,
-    // Texture gradients are analytic.
     exactness: Exactness::Exact { min_psnr_db: 45.0 },
     approximations: &[DERIVATIVE_TANGENTS],
     departures: &[
         "the triangle buffer is filled once the visibility buffer is finished, each triangle once; the paper's memoization cache is fill=cache",
         KEPT_TANGENTS,
+        QUAD_GRADIENTS,
         "derivatives are homogeneous, so that triangles behind the eye need no clip",
     ],
     samples: ANY_SAMPLES,
@@ -174,6 +174,9 @@ pub(crate) const DERIVATIVE_TANGENTS: Approximation = Approximation {
 
 /// What records hold beyond the paper's, of every technique of this family.
 pub(crate) const KEPT_TANGENTS: &str = "records keep the vertices' tangents in scenes with normal maps; the paper's, found from derivatives, are tangents=derivatives";
+
+/// How techniques of this family choose mip levels.
+pub(crate) const QUAD_GRADIENTS: &str = "mip levels follow the differences of texture coordinates within a quad of pixels, as in a raster pass; the paper's follow derivatives at the pixel";
 
 /// How a technique of this family shades what it has found.
 pub(crate) struct Asked {

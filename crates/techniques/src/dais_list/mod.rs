@@ -67,6 +67,7 @@ static INFO: Info = Info {
         "entries of lists refer to triangles by their IDs, and the first of a pixel takes no node",
         "the image is drawn in bands, so that depth at the samples is held for one of them; the paper's single one is bands=1",
         dais::KEPT_TANGENTS,
+        dais::QUAD_GRADIENTS,
     ],
     samples: MULTIPLE_SAMPLES,
     views: views::TRIANGLES,

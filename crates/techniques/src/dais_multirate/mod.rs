@@ -45,6 +45,7 @@ static INFO: Info = Info {
         "indirect light alone is shaded at the low rate, and what is shared is irradiance: the material stays at full rate",
         "the visibility buffer is finished before shading, so that the paper's second one and its pass are not needed",
         dais::KEPT_TANGENTS,
+        dais::QUAD_GRADIENTS,
     ],
     samples: &[1, 2, 4, 8],
     views: views::TRIANGLES,

@@ -50,7 +50,6 @@ static INFO: Info = Info {
         material_access: "rand",
         rates_decoupled: "n, n",
     },
-    // Texture gradients are analytic where compute fills.
     exactness: Exactness::Exact { min_psnr_db: 45.0 },
     approximations: &[Approximation {
         when: &[Condition::SeveralSamples, Condition::Param("position", "depth")],

@@ -2,6 +2,7 @@
 //!
 //! A radix sort from the least significant digit, 8 bits a step, each by three passes: digits are counted, the counts are summed, items are moved.
 
+pub use afterlight_frame::sort_words::{from_sortable_bits, sortable_bits};
 use afterlight_frame::{Frame, TechniqueError};
 use afterlight_graph::{BufferHandle, BufferRole, ComputePass, Graph, PassRole};
 
@@ -62,18 +63,6 @@ impl KeyBits {
     pub fn shifts(self) -> impl Iterator<Item = u32> {
         (0..self.steps()).map(|step| 8 * step)
     }
-}
-
-/// Bits of a float whose order as unsigned numbers is that of the floats ([`f32::total_cmp`]): −0 before 0, NaN first or last by its sign.
-/// The shader's twin stands in `sortable.glsl`.
-pub const fn sortable_bits(value: f32) -> u32 {
-    let bits = value.to_bits();
-    if bits >> 31 == 1 { !bits } else { bits | 1 << 31 }
-}
-
-/// The float that [`sortable_bits`] were made of.
-pub const fn from_sortable_bits(bits: u32) -> f32 {
-    f32::from_bits(if bits >> 31 == 1 { bits & !(1 << 31) } else { !bits })
 }
 
 /// Items on the device: a key and a value each, 32 bits, in two buffers. There is room for as many as the smaller buffer holds.

@@ -1,7 +1,7 @@
 // 32-bit floats as keys of a sort: bits whose order as unsigned numbers is that of the floats. -0 comes before 0, NaN first or
 // last by its sign.
 //
-// CPU twin: sortable_bits and from_sortable_bits in crates/stages/src/shared/sort/mod.rs.
+// CPU twin: sortable_bits and from_sortable_bits in crates/frame/src/sort_words.rs.
 #ifndef AFTERLIGHT_SORTABLE
 #define AFTERLIGHT_SORTABLE
 

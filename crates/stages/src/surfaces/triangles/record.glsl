@@ -41,12 +41,12 @@ const uint NORMAL_LENGTHS_WORD = 26u;
 const uint UV1_WORD = 20u + (TANGENTS == TANGENTS_OF_VERTICES ? 3u : 0u) + (TANGENTS == TANGENTS_WEIGHTED ? 7u : 0u);
 const uint COLOR_WORD = UV1_WORD + (HAS_UV1 != 0u ? 6u : 0u);
 const uint RECORD_WORDS = COLOR_WORD + (HAS_VERTEX_COLOR != 0u ? 12u : 0u);
+const uint RECORD_FRONT = 0x80000000u;
 
 // Records that a buffer of so many words has room for. What its memory is rounded up by holds none. Pipelines do not depend on it, so that a
 // buffer that grows makes none anew.
 uint record_room(int words) {
     return uint(words) / RECORD_WORDS;
 }
-const uint RECORD_FRONT = 0x80000000u;
 
 #endif
