@@ -79,6 +79,7 @@ impl CameraView {
             background_radiance: background_radiance(settings).into(),
             unbounded_light_count: lights.unbounded_count,
             distance_range_m: distance_range_m(bounds_ws, distance_from_world, near_m),
+            samples: settings.samples,
         }
     }
 }

@@ -22,6 +22,7 @@ struct FrameConstants {
     vec3 background_radiance;
     uint unbounded_light_count; // lights without an end, first in the list
     vec2 distance_range_m;      // nearest and farthest view distance that a surface of the scene can have, the first above 0
+    uint samples;               // of a pixel
 };
 
 layout(set = 0, binding = 0, scalar) uniform FrameBlock {

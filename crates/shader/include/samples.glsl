@@ -1,6 +1,7 @@
-// Samples of a pixel: how many, and where they stand (Vulkan 1.3, table "Standard sample locations").
+// Samples of a pixel: how many, and where they stand.
 #ifndef AFTERLIGHT_SAMPLES
 #define AFTERLIGHT_SAMPLES
+#include "sample_locations.glsl"
 
 layout(constant_id = 8) const uint SAMPLES = 4u;
 
@@ -28,17 +29,7 @@ uint sample_word(ivec2 pixel, uint i) {
 
 // Where sample i stands, pixels from the pixel's upper left corner.
 vec2 sample_location(uint i) {
-    const vec2 LOCATIONS[31] = vec2[](
-        vec2(0.5, 0.5),
-        vec2(0.75, 0.75), vec2(0.25, 0.25),
-        vec2(0.375, 0.125), vec2(0.875, 0.375), vec2(0.125, 0.625), vec2(0.625, 0.875),
-        vec2(0.5625, 0.3125), vec2(0.4375, 0.6875), vec2(0.8125, 0.5625), vec2(0.3125, 0.1875),
-        vec2(0.1875, 0.8125), vec2(0.0625, 0.4375), vec2(0.6875, 0.9375), vec2(0.9375, 0.0625),
-        vec2(0.5625, 0.5625), vec2(0.4375, 0.3125), vec2(0.3125, 0.625), vec2(0.75, 0.4375),
-        vec2(0.1875, 0.375), vec2(0.625, 0.8125), vec2(0.8125, 0.6875), vec2(0.6875, 0.1875),
-        vec2(0.375, 0.875), vec2(0.5, 0.0625), vec2(0.25, 0.125), vec2(0.125, 0.75),
-        vec2(0.0, 0.5), vec2(0.9375, 0.25), vec2(0.875, 0.9375), vec2(0.0625, 0.0));
-    return LOCATIONS[SAMPLES - 1u + i];
+    return sample_location_of(SAMPLES, i);
 }
 
 // Normalised device coordinates of a sample.

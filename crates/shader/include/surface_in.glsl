@@ -12,6 +12,18 @@ layout(location = 4) in vec3 normal_ws;
 layout(location = 5) in vec4 tangent_ws;
 #endif
 
+#ifndef WITH_UV
+#include "center_distance.glsl"
+
+// World position where the fragment is lit. Derivatives: every fragment of a quad calls it.
+vec3 center_position() {
+    float inverse = gl_FragCoord.w;
+    float lit = center_inverse_distance(inverse, vec2(dFdx(inverse), dFdy(inverse)));
+    return lit == inverse ? position_ws
+                          : position_from_depth(ndc_from_pixel(uvec2(gl_FragCoord.xy)), depth_from_distance(1.0 / lit));
+}
+#endif
+
 SurfacePoint surface_point() {
     SurfacePoint p;
     p.uv0 = TextureCoordinates(uv0_uv1.xy, vec2(0.0), vec2(0.0));
@@ -19,7 +31,7 @@ SurfacePoint surface_point() {
     p.color = color;
     p.front_facing = gl_FrontFacing;
 #ifndef WITH_UV
-    p.position_ws = position_ws;
+    p.position_ws = center_position();
     p.normal_ws = normal_ws;
     p.tangent_ws = tangent_ws;
 #endif

@@ -8,6 +8,7 @@
 #define EXPLICIT_GRADIENTS
 #include "frame.glsl"
 #include "material.glsl"
+#include "center_distance.glsl"
 
 layout(set = 0, binding = 1) uniform utexture2D draw_data;
 layout(set = 0, binding = 6, scalar) readonly buffer Positions {
@@ -27,6 +28,7 @@ float cross2(vec2 a, vec2 b) {
 // Perspective-correct barycentric coordinates at a pixel.
 struct Barycentrics {
     vec3 at;
+    float inverse_distance; // 1/m; of an orthographic camera 1
     bool counter_clockwise; // on the screen
 };
 
@@ -35,8 +37,10 @@ Barycentrics barycentrics_at(vec2 ndc, vec3 p0, vec3 p1, vec3 p2) {   // p: clip
     vec3 b = vec3(cross2(q1, q2), cross2(q2, q0), cross2(q0, q1));
     Barycentrics r;
     // The sum times the distance at the pixel: the same at every pixel, also where the triangle's plane has ended before it, at the horizon.
-    r.counter_clockwise = dot(b, vec3(p0.z, p1.z, p2.z)) < 0.0;
-    r.at = b / (b.x + b.y + b.z);
+    float sum = b.x + b.y + b.z, sum_distance = dot(b, vec3(p0.z, p1.z, p2.z));
+    r.counter_clockwise = sum_distance < 0.0;
+    r.inverse_distance = sum / sum_distance;
+    r.at = b / sum;
     return r;
 }
 
@@ -87,17 +91,20 @@ bool triangle_at(uint id, vec2 ndc, out float depth) {
     return all(greaterThanEqual(b, vec3(0.0))) && w > 0.0;
 }
 
-// By what barycentric coordinates at the upper left pixel of a quad differ from those beside and below it.
+// By what barycentric coordinates, and the inverse distance, at the upper left pixel of a quad differ from those beside and below it.
 struct QuadBarycentrics {
     vec3 dx;
     vec3 dy;
+    vec2 inverse_distance;
 };
 
 QuadBarycentrics quad_barycentrics(uvec2 pixel, vec3 p0, vec3 p1, vec3 p2) {
     uvec2 corner = pixel & ~1u;
-    vec3 at = barycentrics_at(ndc_from_pixel(corner), p0, p1, p2).at;
-    return QuadBarycentrics(barycentrics_at(ndc_from_pixel(corner + uvec2(1u, 0u)), p0, p1, p2).at - at,
-                            barycentrics_at(ndc_from_pixel(corner + uvec2(0u, 1u)), p0, p1, p2).at - at);
+    Barycentrics at = barycentrics_at(ndc_from_pixel(corner), p0, p1, p2);
+    Barycentrics right = barycentrics_at(ndc_from_pixel(corner + uvec2(1u, 0u)), p0, p1, p2);
+    Barycentrics below = barycentrics_at(ndc_from_pixel(corner + uvec2(0u, 1u)), p0, p1, p2);
+    return QuadBarycentrics(right.at - at.at, below.at - at.at,
+                            vec2(right.inverse_distance, below.inverse_distance) - at.inverse_distance);
 }
 
 // Texture coordinates that stand at word `offset` of the attributes of three vertices.
@@ -119,6 +126,10 @@ SurfacePoint triangle_point(uint id, vec2 ndc, out uint material) {
     uvec3 a = v * 7u;
     SurfacePoint p;
     p.position_ws = b.at.x * p0 + b.at.y * p1 + b.at.z * p2;
+    float lit = center_inverse_distance(b.inverse_distance, quad.inverse_distance);
+    if (lit != b.inverse_distance) {
+        p.position_ws = position_from_depth(ndc, depth_from_distance(1.0 / lit));
+    }
     p.front_facing = b.counter_clockwise != mirrored;
     vec3 n0 = load_normal(d, a.x), n1 = load_normal(d, a.y), n2 = load_normal(d, a.z);
     p.normal_ws = b.at.x * n0 + b.at.y * n1 + b.at.z * n2;

@@ -29,6 +29,8 @@ shader_struct! {
         pub unbounded_light_count: u32,
         /// Nearest and farthest view distance that a surface of the scene can have, metres, the first above 0.
         pub distance_range_m: [f32; 2],
+        /// Samples of a pixel.
+        pub samples: u32,
     }
 
     /// How indirect light is gathered from a reflective shadow map (`include/indirect.glsl`).

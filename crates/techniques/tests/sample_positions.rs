@@ -2,8 +2,10 @@
 
 mod common;
 
+use afterlight_techniques::scene::{Camera, lights::seeded_lights};
 use afterlight_techniques::{Settings, find};
 use common::{Stage, compiled_variant, found_by, image_of, least_db, params, psnr, random_views};
+use glam::Vec3;
 
 /// Greatest error of 65,536 depths at the centre: over 1/256 of what depth changes within the pixel and 2^-24 of the depth, which is
 /// promised. Parts of the header's text are replaced.
@@ -61,6 +63,50 @@ fn random_views_agree_with_forward() {
     });
     println!("lit at samples: {worst_at_samples:.2} dB at worst");
     assert!(worst_at_samples < 38.0, "light at samples stays within the bound of light at centres");
+}
+
+/// A floor from seven millimetres above it, whose horizon crosses the image: found by `verify`. In a row of pixels the floor shows at samples and
+/// ends before the centre.
+fn over_the_floor(stage: &Stage) -> Settings {
+    let eye = Vec3::new(-17.001467, 0.0069989935, -18.276127);
+    let target = Vec3::new(13.449717, -1.3485626, -44.177635);
+    let camera = Camera::look_at("floor", eye, target, 118.5114f32.to_radians(), 0.004);
+    let lights = seeded_lights(&stage.scene.bounds_ws(), 1041, 3164818517);
+    Settings { samples: 4, lights, ..stage.from(camera, (72, 48), 0) }
+}
+
+/// Every technique lights a surface that ends within its pixel at the same place, by whatever way it has to the surface's distance; each way
+/// is left out once, as a mutant.
+#[test]
+fn surfaces_that_end_within_a_pixel_are_lit_alike() {
+    let gpu = afterlight_testkit::gpu();
+    if afterlight_testkit::sample_counts(&gpu, &[4]).is_empty() {
+        return;
+    }
+    let stage = Stage::new(&gpu, "builtin:floor");
+    let settings = over_the_floor(&stage);
+    let reference = stage.image(find("forward").unwrap(), &settings);
+    let header = "center_distance.glsl";
+    let as_it_was = [("frame.samples <= 1u ||", "true ||")];
+    for (id, set, shader) in [
+        ("deferred-ssaa", &[][..], "surfaces/samples/samples.frag"),
+        ("deferred-msaa", &[], "surfaces/samples/samples.frag"),
+        ("deferred-dedup", &[], "deferred_dedup/dedup.frag"),
+        ("gbuffer-list", &[("fill", "compute"), ("position", "distance")], "gbuffer_list/fill.comp"),
+        ("dais", &[("lights", "all")], "dais/shade.comp"),
+        ("dais-multirate", &[("lights", "volumes")], "dais/volume.frag"),
+    ] {
+        let technique = find(id).unwrap();
+        let params = params(technique, set);
+        let db = |shaders: Vec<_>| {
+            psnr(&reference, &image_of(&mut stage.prepare_shaders(technique, &settings, &params, shaders)))
+        };
+        let (here, mutant) = (db(Vec::new()), db(vec![compiled_variant(shader, header, &as_it_was)]));
+        println!("{id} {set:?}: {here:.2} dB, {mutant:.2} as it was");
+        let least = least_db(technique, &params, 4);
+        assert!(here >= least, "{id} {set:?}: {here:.2} dB, {least} promised");
+        assert!(mutant < here - 10.0, "{id} {set:?}: {mutant:.2} dB as it was, a mutant that does no harm");
+    }
 }
 
 /// Where a device's centroids tell no edge, as Vulkan lets them, fragments that differ within a pixel do: silhouettes, edges between

@@ -10,11 +10,7 @@ void visit_pixel(ivec2 pixel) {
     uint name, weight;
     source_begin(pixel);
     while (source_next_triangle(name, weight)) {
-        float distance_m = record_distance(source_place(name), vec2(pixel));
-        // Beside a triangle that is seen edge-on its plane may lie behind the eye.
-        if (distance_m > 0.0) {
-            visit_distance(distance_m);
-        }
+        visit_distance(record_distance(source_place(name), vec2(pixel)));
     }
 }
 

@@ -143,8 +143,9 @@ pub fn look_through<T>(
     declare: impl FnOnce(&mut Graph, &Frame<'_>) -> Result<T, TechniqueError>,
 ) -> Result<T, TechniqueError> {
     let constants = constants_of_pose(graph, frame, &format!("{pass} view"), move |view| {
-        through(view, size_px).map_or_else(FrameConstants::zeroed, |camera| {
-            camera.constants(view.settings, view.lights, &view.bounds_ws())
+        through(view, size_px).map_or_else(FrameConstants::zeroed, |camera| FrameConstants {
+            samples: 1,
+            ..camera.constants(view.settings, view.lights, &view.bounds_ws())
         })
     })?;
     let named = (&*format!("{pass} draw"), ChangesWith::Pose);

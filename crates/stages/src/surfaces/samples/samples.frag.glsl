@@ -26,6 +26,7 @@ void main() {
     float depth = depth_from_position(position_ws);
     float depth_change = abs(dFdx(depth)) + abs(dFdy(depth));
     Surface s = visible_surface();
+    depth = depth_from_position(s.position_ws);
     base_color_metallic = vec4(s.base_color, s.metallic);
     normal_oct = octahedral_encode(s.normal_ws) * 0.5 + 0.5;
     float roughness = s.unlit ? 0.0 : max(s.roughness, MIN_ROUGHNESS);

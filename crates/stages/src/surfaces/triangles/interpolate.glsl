@@ -4,6 +4,7 @@
 #define AFTERLIGHT_INTERPOLATE
 #include "surfaces/triangles/record.glsl"
 #include "surfaces/geometry/packed_normals.glsl"
+#include "center_distance.glsl"
 
 layout(set = 0, binding = 20, scalar) readonly buffer TriangleBuffer {
     uint triangle_buffer[];
@@ -128,11 +129,11 @@ vec2 record_offset(uint record, vec2 pixel) {
     return pixel - vec2(packed_anchor & 0xffffu, packed_anchor >> 16);
 }
 
-// View distance of a triangle's plane, m.
+// View distance at which a triangle is lit in a pixel, m.
 float record_distance(uint index, vec2 pixel) {
     uint record = record_at(index);
-    float first = record_affine(record, record_offset(record, pixel)).x;
-    return frame.eye_ws.w == 0.0 ? first : 1.0 / first;
+    vec3 first = record_affine(record, record_offset(record, pixel));
+    return frame.eye_ws.w == 0.0 ? first.x : 1.0 / center_inverse_distance(first.x, first.yz);
 }
 
 SurfacePoint interpolated_point(uint index, vec2 pixel, out uint material) {
@@ -143,6 +144,9 @@ SurfacePoint interpolated_point(uint index, vec2 pixel, out uint material) {
     bool orthographic = frame.eye_ws.w == 0.0;
     vec3 inverse_w = orthographic ? vec3(1.0, 0.0, 0.0) : first_words;
     float w = 1.0 / inverse_w.x;
+    if (!orthographic) {
+        first_words.x = center_inverse_distance(first_words.x, first_words.yz);
+    }
     material = triangle_buffer[record + 18u] & ~RECORD_FRONT;
 
     SurfacePoint p;
