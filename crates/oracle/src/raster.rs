@@ -295,8 +295,13 @@ impl<'a> RayScene<'a> {
 
     /// Unit normal of a hit's triangle in world space, to either side.
     pub fn plane_normal_ws(&self, hit: &Hit) -> DVec3 {
-        let [a, b, c] = corners_ws(self.scene, &self.scene.instances[hit.instance as usize], hit.triangle);
+        let [a, b, c] = self.corners_ws(hit);
         (b - a).cross(c - a).normalize_or_zero()
+    }
+
+    /// Corners of a hit's triangle, world space.
+    pub fn corners_ws(&self, hit: &Hit) -> [DVec3; 3] {
+        corners_ws(self.scene, &self.scene.instances[hit.instance as usize], hit.triangle)
     }
 
     /// The surface of a hit: attributes, factors, textures made by code on their finest level (glTF 2.0, section 3.9).
@@ -355,6 +360,18 @@ impl<'a> RayScene<'a> {
 /// The ray through the centre of a pixel, row 0 on top.
 pub fn pixel_ray(camera: &Camera, pixel: [u32; 2], size_px: [u32; 2]) -> Ray {
     ray_through(camera, DVec2::new(f64::from(pixel[0]), f64::from(pixel[1])) + 0.5, size_px)
+}
+
+/// Where a point is seen, pixels from the image's upper left corner; `None` behind the eye. The inverse of [`ray_through`].
+pub fn place_of(camera: &Camera, point_ws: DVec3, size_px: [u32; 2]) -> Option<DVec2> {
+    let [width, height] = size_px.map(f64::from);
+    let at = world_from_view(camera).inverse().transform_point3(point_ws);
+    let half = match camera.projection {
+        Projection::Perspective { fov_y_rad, .. } => -at.z * (0.5 * f64::from(fov_y_rad)).tan(),
+        Projection::Orthographic { half_height_m, .. } => f64::from(half_height_m),
+    };
+    let (right, up) = (at.x / (half * width / height), at.y / half);
+    (half > 0.0).then(|| DVec2::new((right + 1.0) * 0.5 * width, (1.0 - up) * 0.5 * height))
 }
 
 /// The ray through a place of an image, pixels from its upper left corner.

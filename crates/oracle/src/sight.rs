@@ -8,7 +8,7 @@ use afterlight_scene::{AlphaMode, Camera, Light, Projection};
 use glam::{DVec2, DVec3};
 
 use crate::brdf::shade;
-use crate::raster::{Hit, Ray, RayScene, ray_through};
+use crate::raster::{Hit, Ray, RayScene, place_of, ray_through};
 
 /// How far from a pixel's centre a device may sample, pixels along each axis: Vulkan requires vertices to be snapped to 1/16 pixel or finer
 /// (`subPixelPrecisionBits` of at least 4).
@@ -98,14 +98,48 @@ impl<'a> Judge<'a> {
         Self { rays, camera, size_px, rounding_m }
     }
 
-    /// What a pixel may show, row 0 on top; `None` where rounding moves surfaces by more than 1.5 pixels, so that nothing can be said.
+    /// What a pixel may show, row 0 on top, by nine rays; `None` where rounding moves surfaces by more than 1.5 pixels, so that nothing can
+    /// be said.
     pub fn sight(&self, pixel: [u32; 2]) -> Option<Sight> {
-        let (narrow, nearest_m) = self.around(pixel, SNAP_PX);
+        self.sight_by(pixel, 1)
+    }
+
+    /// The same by 289 rays, which find surfaces so thin that they pass between the nine: rods of a hundredth of a pixel, seen from far.
+    pub fn close_sight(&self, pixel: [u32; 2]) -> Option<Sight> {
+        self.sight_by(pixel, 8)
+    }
+
+    /// Whether a triangle shows in the pixel, at any of 256 rays, that is thinner on the screen than the grid on which a device may snap its
+    /// vertices: it is drawn as another triangle then, and what is continued from it to the pixel's centre may be anything.
+    pub fn shows_a_sliver(&self, pixel: [u32; 2]) -> bool {
+        let places = (0..16).flat_map(|y| (0..16).map(move |x| DVec2::new(f64::from(x), f64::from(y))));
+        let corner = DVec2::new(f64::from(pixel[0]), f64::from(pixel[1]));
+        let mut seen = None;
+        places.into_iter().any(|place| {
+            let hit =
+                self.rays.first_hit(&ray_through(self.camera, corner + (place + 0.5) / 16.0, self.size_px));
+            let is_new = hit.map(|hit| hit.place()) != seen;
+            seen = hit.map(|hit| hit.place());
+            is_new && hit.is_some_and(|hit| self.is_sliver(&hit))
+        })
+    }
+
+    /// Whether the least height of a triangle on the screen is below [`SNAP_PX`]; never of one that reaches behind the eye.
+    fn is_sliver(&self, hit: &Hit) -> bool {
+        let corners = self.rays.corners_ws(hit).map(|corner| place_of(self.camera, corner, self.size_px));
+        let [Some(a), Some(b), Some(c)] = corners else { return false };
+        let longest_px = (b - a).length().max((c - b).length()).max((a - c).length());
+        (b - a).perp_dot(c - a).abs() < SNAP_PX * longest_px
+    }
+
+    /// What a pixel may show by rays in so many steps from the centre to each side.
+    fn sight_by(&self, pixel: [u32; 2], steps: i32) -> Option<Sight> {
+        let (narrow, nearest_m) = self.around(pixel, SNAP_PX, steps);
         let widened_px = SNAP_PX + self.rounding_m / self.pixel_width_m(nearest_m.max(0.0));
         if widened_px > WIDEST_PX {
             return None;
         }
-        if widened_px < 1.1 * SNAP_PX { Some(narrow) } else { Some(self.around(pixel, widened_px).0) }
+        if widened_px < 1.1 * SNAP_PX { Some(narrow) } else { Some(self.around(pixel, widened_px, steps).0) }
     }
 
     /// Width of a pixel at a view distance, metres.
@@ -120,12 +154,15 @@ impl<'a> Judge<'a> {
     }
 
     /// What rays around a pixel's centre show, and the nearest view distance among them, metres.
-    fn around(&self, pixel: [u32; 2], offset_px: f64) -> (Sight, f64) {
+    fn around(&self, pixel: [u32; 2], offset_px: f64, steps: i32) -> (Sight, f64) {
         let center = DVec2::new(f64::from(pixel[0]), f64::from(pixel[1])) + 0.5;
-        let rays = OFFSETS.map(|[x, y]| {
-            let place = center + offset_px * DVec2::new(f64::from(x), f64::from(y));
+        let others = (-steps..=steps).flat_map(|y| (-steps..=steps).map(move |x| [x, y]));
+        let offsets = std::iter::once([0, 0]).chain(others.filter(|offset| *offset != [0, 0]));
+        let ray = |[x, y]: [i32; 2]| {
+            let place = center + offset_px / f64::from(steps) * DVec2::new(f64::from(x), f64::from(y));
             self.loosened(ray_through(self.camera, place, self.size_px))
-        });
+        };
+        let rays: Vec<Ray> = offsets.map(ray).collect();
         let mut sight = Sight {
             candidates: Vec::new(),
             may_be_nothing: false,
@@ -282,6 +319,21 @@ mod tests {
 
     fn load(source: &str) -> afterlight_scene::Scene {
         load_source(source, &Default::default()).unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    /// A lamp's rod is 3/128 pixel wide where `verify` found it.
+    #[test]
+    fn a_rod_between_the_nine_rays_is_found_by_more() {
+        let scene = load("builtin:colonnade");
+        let rays = RayScene::new(&scene);
+        let numbers = "-6.7697783,4.513236,2.9304557,0.84286547,-8.888523,-23.133291,orthographic,26.562166,0.0026808789,123.77013";
+        let camera = afterlight_scene::camera::select(&scene, Some(numbers)).expect("a camera");
+        let judge = Judge::new(&rays, &camera, [169, 89]);
+        let rod = Seen::Surface([1.8257; 2]);
+        assert!(!judge.sight([95, 44]).expect("is judged").accepts(rod));
+        assert!(judge.close_sight([95, 44]).expect("is judged").accepts(rod));
+        // Beside it there is none.
+        assert!(!judge.close_sight([92, 44]).expect("is judged").accepts(rod));
     }
 
     #[test]

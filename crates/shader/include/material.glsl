@@ -38,6 +38,13 @@ struct TextureCoordinates {
     vec2 ddy;
 };
 
+// Where a triangle's plane ends at one of the quad's pixels, at its horizon, no difference is finite. It counts as larger than any: the
+// smallest mip level, as a raster pass has it, whose interpolation is off by a rounding and so finite.
+vec2 finite_change(vec2 change) {
+    const float MOST = 1e10;
+    return vec2(abs(change.x) < MOST ? change.x : MOST, abs(change.y) < MOST ? change.y : MOST);
+}
+
 // Attributes interpolated at a point of a triangle.
 struct SurfacePoint {
     vec3 position_ws;

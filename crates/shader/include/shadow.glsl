@@ -23,7 +23,8 @@ layout(set = 0, binding = 25) uniform texture2D shadow_map;
 
 // Fraction of the light that reaches a point: the part of a square of 2 x 2 texels around the point in the map whose stored surfaces are
 // not nearer to the light. Each of the nine texels that the square touches counts by the area that it has in the square, so that the
-// fraction is continuous. Points outside of the map are lit.
+// fraction is continuous. Points outside of the map are lit; towards its border shadows fade within two texels, so that there too no rounding
+// of the position turns a pixel from dark to bright.
 float lit_share(vec3 position_ws) {
     vec4 p = shadow.texel_from_world * vec4(position_ws, 1.0);
     vec2 place = p.xy / p.w;
@@ -42,7 +43,8 @@ float lit_share(vec3 position_ws) {
             sum += depth >= texelFetch(shadow_map, texel + ivec2(x, y), 0).r ? width * height : 0.0;
         }
     }
-    return 0.25 * sum;
+    vec2 to_border = min(place - 1.0, float(shadow.size_px - 1u) - place);
+    return mix(1.0, 0.25 * sum, min(0.5 * min(to_border.x, to_border.y), 1.0));
 }
 
 #endif

@@ -110,7 +110,7 @@ QuadBarycentrics quad_barycentrics(uvec2 pixel, vec3 p0, vec3 p1, vec3 p2) {
 // Texture coordinates that stand at word `offset` of the attributes of three vertices.
 TextureCoordinates interpolate_uv(Barycentrics b, QuadBarycentrics quad, uvec3 first, uint offset) {
     mat3x2 uv = mat3x2(load_uv(first.x, offset), load_uv(first.y, offset), load_uv(first.z, offset));
-    return TextureCoordinates(uv * b.at, uv * quad.dx, uv * quad.dy);
+    return TextureCoordinates(uv * b.at, finite_change(uv * quad.dx), finite_change(uv * quad.dy));
 }
 
 SurfacePoint triangle_point(uint id, vec2 ndc, out uint material) {

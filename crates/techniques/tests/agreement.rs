@@ -209,6 +209,35 @@ fn on_an_empty_scene() {
     all_agree(&stage, &stage.settings((20, 20), 0), "empty", 1);
 }
 
+/// A level view whose rows are odd in number: pixel centres lie on the floor's horizon, and in the quads of the row below no difference of texture
+/// coordinates is finite.
+#[test]
+fn mip_levels_beside_a_horizon_are_those_of_a_raster_pass() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=30000");
+    let eye = Vec3::new(8.54382, 0.06336212, -5.3927307);
+    let camera = Camera::look_at("level", eye, eye + 30.0 * Vec3::Z, 53.1f32.to_radians(), 0.003);
+    let settings = stage.from(camera, (169, 73), 122);
+    let reference = stage.image(find("forward").unwrap(), &settings);
+    let as_it_was =
+        [("abs(change.x) < MOST ? change.x : MOST, abs(change.y) < MOST ? change.y : MOST", "change")];
+    for (id, shader) in
+        [("visibility", "visibility/shade.comp"), ("gbuffer-list", "gbuffer_list/fill.comp#one")]
+    {
+        let technique = find(id).unwrap();
+        let raster = params(technique, &[("visibility", "raster")]);
+        let db = |shaders: Vec<_>| {
+            psnr(&reference, &image_of(&mut stage.prepare_shaders(technique, &settings, &raster, shaders)))
+        };
+        let mutant = compiled_variant(shader, "material.glsl", &as_it_was);
+        let (here, mutant) = (db(Vec::new()), db(vec![mutant]));
+        println!("{id}: {here:.2} dB, {mutant:.2} as it was");
+        let least = least_db(technique, &raster, 1);
+        assert!(here >= least, "{id}: {here:.2} dB");
+        assert!(mutant < least, "{id}: {mutant:.2} dB as it was, a mutant within the bound");
+    }
+}
+
 /// Techniques that read a triangle's vertices choose the mip levels of a raster pass on surfaces seen at a flat angle: by the differences within a
 /// quad of pixels. Changes from each pixel to its neighbours are others.
 #[test]

@@ -3,7 +3,7 @@
 mod common;
 
 use afterlight_techniques::{Indirect, Settings, find, graph::gpu, shader::Shader};
-use common::{Stage, compiled_variant, found_by, params, radiance_of, subgroup_sizes};
+use common::{Stage, compiled_variant, found_by, image_of, params, psnr, radiance_of, subgroup_sizes};
 
 fn counts(device: &gpu::Device) -> Vec<u32> {
     afterlight_testkit::sample_counts(device, &[1, 4, 8])
@@ -162,6 +162,22 @@ fn without_indirect_light_it_is_dais() {
     let settings = Settings { samples: 4, ..stage.settings((64, 36), 3) };
     let [low, full] = ["dais-multirate", "dais"].map(|id| radiance(&stage, &settings, id, RASTER, 1));
     assert!(low == full);
+}
+
+/// The shading pass alone shares indirect light; the pass of the light volumes, of the same surfaces, has no grid.
+#[test]
+fn a_shared_grid_goes_with_light_volumes() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:intersect");
+    let settings =
+        stage.settings((64, 36), 3).with_effects(|effects| effects.indirect.method = Indirect::Rsm);
+    let technique = find("dais-multirate").unwrap();
+    let image = |lights: &str| {
+        let params = params(technique, &[("share", "grid"), ("lights", lights), ("visibility", "raster")]);
+        image_of(&mut stage.prepare_with(technique, &settings, &params))
+    };
+    let db = psnr(&image("all"), &image("volumes"));
+    assert!(db >= 50.0, "{db:.2} dB between light volumes and all lights");
 }
 
 #[test]

@@ -299,8 +299,7 @@ impl Check<'_> {
         Ok(())
     }
 
-    /// An image that keeps its bound without pixels that no rule decides; `None` where it does not, and where rays cannot tell: with several
-    /// samples a pixel, and without rays.
+    /// An image that keeps its bound without pixels that no rule decides; `None` where it does not, and without rays.
     fn settled(
         &self,
         view: &View,
@@ -308,8 +307,8 @@ impl Check<'_> {
         images: (&Rgba8Image, &Rgba8Image),
         bound_db: f64,
     ) -> Result<Option<Settled>, LabError> {
-        let Some(rays) = self.rays.as_ref().filter(|_| view.spec.samples == 1) else { return Ok(None) };
-        Ok(settle(rays, &settings.camera, images, bound_db)?)
+        let Some(rays) = &self.rays else { return Ok(None) };
+        Ok(settle(rays, &settings.camera, view.spec.samples, images, bound_db)?)
     }
 
     /// Has rays judge pixels of the reference at one sample, without shadows and indirect light, which rays do not see.

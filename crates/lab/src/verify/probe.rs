@@ -47,12 +47,15 @@ pub fn judge(rays: &RayScene<'_>, drawn: &Drawn<'_>, count: u32, rng: &mut Split
     for number in 0..count {
         let pixel = size_px.map(|size| ((rng.next_f32() * size as f32) as u32).min(size - 1));
         let place = pixel[1] as usize * size_px[0] as usize + pixel[0] as usize;
-        let Some(sight) = judge.sight(pixel) else {
+        let Some(mut sight) = judge.sight(pixel) else {
             judged.probes.unjudged += 1;
             continue;
         };
         judged.probes.surfaces += 1;
         let seen = Seen::of_depth(drawn.depth.values[place], drawn.depth.to_distance);
+        if !sight.accepts(seen) {
+            sight = judge.close_sight(pixel).unwrap_or(sight);
+        }
         if !sight.accepts(seen) {
             let reason = format!("found {}, expected {}", text(seen), sight.text());
             judged.off.push((pixel, reason));

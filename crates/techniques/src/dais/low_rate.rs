@@ -1,7 +1,7 @@
 //! Indirect light of the family at a lower rate than direct light: its parameters, and what shading takes of them.
 
 use afterlight_frame::{
-    Frame, SourceSlots, TechniqueError,
+    Frame, TechniqueError,
     params::{choices, parameters},
 };
 use afterlight_graph::gpu;
@@ -130,10 +130,8 @@ impl LowRate {
         if self.quads { "quads" } else { "grid" }
     }
 
-    /// Sets the specialization constants of `low_rate.glsl`.
-    pub fn constants(&self, pass: &mut dyn SourceSlots) {
-        if !self.quads {
-            pass.constant("CELL_PX", self.cell_px);
-        }
+    /// The specialization constants of `low_rate.glsl`.
+    pub fn constants(&self) -> Vec<(&'static str, u32)> {
+        if self.quads { Vec::new() } else { vec![("CELL_PX", self.cell_px)] }
     }
 }

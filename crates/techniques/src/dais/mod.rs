@@ -219,7 +219,7 @@ pub(crate) fn record(
 
 /// The source of surfaces of `source_dais.glsl` in the variants with a tag.
 fn source_of<'a>(frame: &Frame<'_>, tag: &'a str) -> SurfaceSource<'a> {
-    SurfaceSource { folder: "dais", tag, shading_tag: None, samples: frame.samples }
+    SurfaceSource { folder: "dais", tag, shading_tag: None, shading_constants: &[], samples: frame.samples }
 }
 
 /// Declares the shading pass or, where the frame shows a view of `records`, its passes; `bind` binds what `source`, whose surfaces
@@ -236,13 +236,13 @@ pub(crate) fn shade(
     if views::is_of_triangles(frame.view) {
         return RecordSource { technique, source, records, bind }.record(graph, frame);
     }
-    let source = SurfaceSource { shading_tag: rate.as_ref().map(LowRate::tag), ..source };
-    shade::shade(graph, frame, (technique, lights), source, surfaces, &|pass| {
-        if let Some(rate) = rate {
-            rate.constants(pass);
-        }
-        bind(pass);
-    })
+    let constants = rate.as_ref().map_or(Vec::new(), LowRate::constants);
+    let source = SurfaceSource {
+        shading_tag: rate.as_ref().map(LowRate::tag),
+        shading_constants: &constants,
+        ..source
+    };
+    shade::shade(graph, frame, (technique, lights), source, surfaces, bind)
 }
 
 /// Whether fragments store their triangles through the cache: as asked for, and of tessellated surfaces, whose triangles no index

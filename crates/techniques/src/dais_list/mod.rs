@@ -111,7 +111,13 @@ impl Technique for DaisList {
         let rate = LowRate::chosen(frame, INFO.id, params.rate)?;
         let asked = Asked { technique: INFO.id, lights: params.light_step().method(frame), rate };
         let tag = if frame.tessellate_px.is_some() { "places" } else { "" };
-        let source = SurfaceSource { folder: "dais_list", tag, shading_tag: None, samples: frame.samples };
+        let source = SurfaceSource {
+            folder: "dais_list",
+            tag,
+            shading_tag: None,
+            shading_constants: &[],
+            samples: frame.samples,
+        };
         let stored = triangles.store(graph, frame, params.record)?;
         let bind = |pass: &mut dyn SourceSlots| {
             lists.bind(pass);

@@ -80,6 +80,7 @@ impl Technique for DeferredDedup {
             folder: "deferred_dedup",
             tag: "",
             shading_tag: emission_tag(frame),
+            shading_constants: &[],
             samples: frame.samples,
         };
         let radiance =

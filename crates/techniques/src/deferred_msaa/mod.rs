@@ -127,6 +127,7 @@ impl Technique for DeferredMsaa {
                     folder: "deferred_msaa",
                     tag: "",
                     shading_tag: emission_tag(frame),
+                    shading_constants: &[],
                     samples: frame.samples,
                 };
                 shade::shade(graph, frame, (INFO.id, lights), source, &surfaces, &|pass| {

@@ -84,6 +84,7 @@ impl Technique for DeferredSsaa {
             folder: "deferred_ssaa",
             tag: "",
             shading_tag: emission_tag(frame),
+            shading_constants: &[],
             samples: frame.samples,
         };
         let at_samples = frame.params.typed::<PositionParams>().at_samples();

@@ -222,7 +222,13 @@ impl Technique for GbufferList {
             graph,
             frame,
             (INFO.id, params.light_step().method(frame)),
-            SurfaceSource { folder: "gbuffer_list", tag, shading_tag: None, samples: layout.samples },
+            SurfaceSource {
+                folder: "gbuffer_list",
+                tag,
+                shading_tag: None,
+                shading_constants: &[],
+                samples: layout.samples,
+            },
             &lists.samples.surfaces(layout.samples),
             &|pass| {
                 set_constants(pass, layout.constants());

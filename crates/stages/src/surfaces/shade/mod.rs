@@ -29,6 +29,8 @@ pub struct SurfaceSource<'a> {
     pub tag: &'a str,
     /// What the variant of `shade.comp` has besides: emission, or how it shares indirect light.
     pub shading_tag: Option<&'a str>,
+    /// Specialization constants that this variant has besides.
+    pub shading_constants: &'a [(&'a str, u32)],
     /// Samples a pixel.
     pub samples: u32,
 }
@@ -77,6 +79,7 @@ pub fn shade(
     let mut pass = frame.compute(graph, &format!("{technique}/shade"), PassRole::Shading, &shader);
     set_constants(&mut pass, shade_constants(frame, samples));
     set_constants(&mut pass, step.constants());
+    set_constants(&mut pass, source.shading_constants.iter().copied());
     bind(&mut pass);
     step.bind(frame, &mut pass);
     let radiance = pass.write("hdr", radiance);

@@ -37,8 +37,8 @@ vec2 uv_at(uint word, vec2 from_anchor_px, vec3 inverse_w, vec2 step_px) {
 TextureCoordinates quad_uv(uint word, vec2 from_anchor_px, vec3 inverse_w, vec2 to_corner_px) {
     vec2 corner = uv_at(word, from_anchor_px, inverse_w, to_corner_px);
     return TextureCoordinates(uv_at(word, from_anchor_px, inverse_w, vec2(0.0)),
-                              uv_at(word, from_anchor_px, inverse_w, to_corner_px + vec2(1.0, 0.0)) - corner,
-                              uv_at(word, from_anchor_px, inverse_w, to_corner_px + vec2(0.0, 1.0)) - corner);
+                              finite_change(uv_at(word, from_anchor_px, inverse_w, to_corner_px + vec2(1.0, 0.0)) - corner),
+                              finite_change(uv_at(word, from_anchor_px, inverse_w, to_corner_px + vec2(0.0, 1.0)) - corner));
 }
 
 // The same with changes at the pixel's centre: what tangents follow.
