@@ -56,6 +56,17 @@ pub enum TechniqueError {
         /// Lights that were planned for.
         expected: u32,
     },
+    /// A pose's joints or weights of morph targets are not as many as the scene's.
+    #[error(
+        "shapes of a pose: found {} joints and {} weights of morph targets, expected {} and {} as the scene has",
+        found[0], found[1], expected[0], expected[1]
+    )]
+    OtherShapes {
+        /// Joints and weights of the pose.
+        found: [usize; 2],
+        /// Those of the scene.
+        expected: [u32; 2],
+    },
     /// Something larger than the device takes.
     #[error("{what}: found {found}, expected at most {limit}")]
     TooLarge {

@@ -114,10 +114,7 @@ impl Frame<'_> {
     /// # Errors
     /// [`TechniqueError::UnknownShader`].
     pub fn shader(&self, name: &str) -> Result<Shader, TechniqueError> {
-        let mut all = self.shaders.iter().copied().flatten();
-        all.find(|shader| shader.name == *name)
-            .cloned()
-            .ok_or_else(|| TechniqueError::UnknownShader { name: name.to_owned() })
+        find_shader(self.shaders, name)
     }
 
     /// Describes an image as large as the frame, one sample.
@@ -274,6 +271,17 @@ impl Frame<'_> {
     }
 }
 
+/// A shader by name among lists of them; of equal names the first counts.
+///
+/// # Errors
+/// [`TechniqueError::UnknownShader`].
+pub fn find_shader(shaders: &[&[Shader]], name: &str) -> Result<Shader, TechniqueError> {
+    let mut all = shaders.iter().copied().flatten();
+    all.find(|shader| shader.name == *name)
+        .cloned()
+        .ok_or_else(|| TechniqueError::UnknownShader { name: name.to_owned() })
+}
+
 /// Checks that one binding of a device that reaches `limit` bytes holds a buffer.
 fn check_range(technique: &str, what: &str, bytes: u64, limit: u64) -> Result<(), TechniqueError> {
     if bytes > limit {
@@ -284,7 +292,7 @@ fn check_range(technique: &str, what: &str, bytes: u64, limit: u64) -> Result<()
 }
 
 /// `count` groups in rows of one length of at most `most` groups.
-fn in_rows(count: u32, most: u32) -> [u32; 3] {
+pub fn in_rows(count: u32, most: u32) -> [u32; 3] {
     let rows = count.div_ceil(most).max(1);
     [count.div_ceil(rows), rows, 1]
 }

@@ -83,7 +83,7 @@ struct Seen {
 }
 
 /// Plays a path through a scene that plays its first animation, with one technique after another. `sees` gets every picture, where there is one
-/// who wants them. Skins and morph targets stay in the pose that the scene was loaded in, which a warning tells.
+/// who wants them.
 ///
 /// # Errors
 /// A technique that cannot draw these frames, a motion that mirrors an instance, the device, those of `sees`.
@@ -104,9 +104,6 @@ pub fn play(
         scene_moves: poses.is_some(),
     };
     let first = how.camera(path, 0);
-    if poses.is_some() && !scene.deformations.is_empty() {
-        listener.warn("skins and morph targets: found some that may move, expected none; they stay in the pose of --time");
-    }
     let task = listener.task("preparing", chosen.len() as u64);
     let mut flights = Vec::with_capacity(chosen.len());
     for one in chosen {
@@ -174,10 +171,7 @@ impl<'a> Poses<'a> {
 
     fn at(&mut self, time_s: f64) -> Arc<ScenePose> {
         self.scene.pose_into(Moment::at(time_s), &mut self.pose);
-        Arc::new(ScenePose {
-            world_from_objects: self.pose.world_from_object.clone(),
-            lights: self.lights_move.then(|| self.pose.lights.clone()),
-        })
+        Arc::new(ScenePose::of(self.scene, &self.pose, self.lights_move))
     }
 }
 

@@ -10,7 +10,7 @@ use std::{
 };
 
 use afterlight_graph::{FrameSlot, FrameTimes, ResourceId};
-use afterlight_scene::{Camera, Light};
+use afterlight_scene::{Aabb, Camera, Light, Pose, Scene, ShapePose};
 use glam::Affine3A;
 
 use crate::{Prepared, Renderer, renderer::Recipe};
@@ -69,6 +69,33 @@ pub struct ScenePose {
     pub world_from_objects: Vec<Affine3A>,
     /// The lights, as many and of the same kinds as the renderer's; `None` is those.
     pub lights: Option<Vec<Light>>,
+    /// Shapes of skinned and morphed meshes; `None` is those of the pose before, at first those that were uploaded.
+    pub shapes: Option<PosedBounds>,
+}
+
+/// Shapes of skinned and morphed meshes at one time.
+#[derive(Clone, Debug)]
+pub struct PosedBounds {
+    /// Joints and weights, as many as the scene has.
+    pub pose: ShapePose,
+    /// A box of each deformed instance ([`Scene::deformed_bounds_os`]).
+    pub bounds_os: Vec<(u32, Aabb)>,
+}
+
+impl ScenePose {
+    /// A pose of the scene as it was loaded; its lights where `lights_move`.
+    pub fn of(scene: &Scene, pose: &Pose, lights_move: bool) -> Self {
+        let shapes = (!scene.deformations.is_empty()).then(|| {
+            let pose =
+                ShapePose { object_from_bind: pose.object_from_bind.clone(), weights: pose.weights.clone() };
+            PosedBounds { bounds_os: scene.deformed_bounds_os(&pose), pose }
+        });
+        Self {
+            world_from_objects: pose.world_from_object.clone(),
+            lights: lights_move.then(|| pose.lights.clone()),
+            shapes,
+        }
+    }
 }
 
 /// Something that costs a frame more than its neighbours.

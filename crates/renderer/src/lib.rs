@@ -8,6 +8,6 @@ mod prepared;
 mod renderer;
 pub mod supersample;
 
-pub use flight::{Done, Event, Flight, FlightOptions, FrameContext, ScenePose, Shortfall};
+pub use flight::{Done, Event, Flight, FlightOptions, FrameContext, PosedBounds, ScenePose, Shortfall};
 pub use prepared::{Prepared, StoredDepth};
 pub use renderer::Renderer;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::flight::ScenePose;
 use afterlight_graph::{Executor, FrameInput, FrameReport, ResourceId, gpu};
-use afterlight_scene::{Camera, Light};
+use afterlight_scene::{Camera, Light, ShapePose};
 
 use afterlight_frame::{
     CameraView, DrawParams, LightPairs, SceneLights, Settings, TechniqueError, View, ViewInput, ViewInputs,
@@ -109,7 +109,15 @@ impl Viewed {
             return Ok(());
         };
         let placed = self.moved.placed.get_or_insert_with(|| Box::new(self.scene.rest.clone()));
-        let moved = placed.place(&self.scene.draw_sources, &pose.world_from_objects);
+        let deformed = match &pose.shapes {
+            Some(shapes) => {
+                check_shapes(&self.scene, &shapes.pose)?;
+                placed.shapes.set(&shapes.pose);
+                &shapes.bounds_os[..]
+            }
+            None => &[],
+        };
+        let moved = placed.place(&self.scene.draw_sources, &pose.world_from_objects, deformed);
         moved.map_err(|TurnedOver { instance }| TechniqueError::TurnedOver { instance })
     }
 
@@ -129,6 +137,17 @@ impl Viewed {
             visible: &self.draws.visible,
             placed: self.placed(),
         }
+    }
+}
+
+/// Checks that a pose has the joints and the weights that the scene was uploaded with.
+fn check_shapes(scene: &SceneGpu, pose: &ShapePose) -> Result<(), TechniqueError> {
+    let expected =
+        scene.deformed.as_ref().map_or([0; 2], |deformed| [deformed.joint_count, deformed.weight_count]);
+    let found = [pose.object_from_bind.len(), pose.weights.len()];
+    match found == expected.map(|count| count as usize) {
+        true => Ok(()),
+        false => Err(TechniqueError::OtherShapes { found, expected }),
     }
 }
 

@@ -27,7 +27,7 @@ use afterlight_stages::{
         transparent::{self, BlendedList},
     },
     lights::volumes,
-    shared::{indirect, shadow},
+    shared::{deform, indirect, shadow},
     views::{light_pair_colors, of as technique_views},
 };
 
@@ -289,6 +289,7 @@ impl Renderer {
 
         let inputs = ViewInputs::default();
         let mut graph = Graph::new();
+        let shaders: &[&[Shader]] = &[&self.extra_shaders, technique.shaders(), &afterlight_stages::SHADERS];
         let mut frame = Frame {
             width_px: settings.width_px,
             height_px: settings.height_px,
@@ -302,8 +303,8 @@ impl Renderer {
             view: &settings.view,
             tessellate_px: settings.effects.tessellation.edge_px,
             displacement_m: settings.effects.tessellation.displacement_m(),
-            buffers: self.import(&mut graph, &inputs, scene_moves)?,
-            shaders: &[&self.extra_shaders, technique.shaders(), &afterlight_stages::SHADERS],
+            buffers: self.import(&mut graph, &inputs, shaders, scene_moves)?,
+            shaders,
             device: &self.device,
             capacities: &capacities,
             visible: view.visible,
@@ -347,6 +348,7 @@ impl Renderer {
         &self,
         graph: &mut Graph,
         inputs: &ViewInputs,
+        shaders: &[&[Shader]],
         alive: bool,
     ) -> Result<SceneBuffers, TechniqueError> {
         let s = &self.scene;
@@ -377,6 +379,12 @@ impl Renderer {
                 graph.import_image("light spheres", BufferRole::Lights, &self.lights.spheres, UPLOADED),
             ),
         };
+        let (positions, attributes) = (
+            graph.import_buffer("scene positions", BufferRole::Scene, &s.positions),
+            graph.import_buffer("scene attributes", BufferRole::Scene, &s.attributes),
+        );
+        let given = deform::Given { device: &self.device, inputs, scene: s, shaders };
+        let (positions, attributes) = deform::record(graph, &given, positions, attributes)?;
         Ok(SceneBuffers {
             frame: constants,
             draws: stream,
@@ -389,8 +397,8 @@ impl Renderer {
             ),
             lights,
             light_spheres,
-            positions: graph.import_buffer("scene positions", BufferRole::Scene, &s.positions),
-            attributes: graph.import_buffer("scene attributes", BufferRole::Scene, &s.attributes),
+            positions,
+            attributes,
             indices: graph.import_buffer("scene indices", BufferRole::Scene, &s.indices),
             commands: draws.commands,
             command_counts: draws.counts,

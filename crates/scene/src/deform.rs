@@ -107,6 +107,15 @@ pub struct Deformation {
     pub first_weight: u32,
 }
 
+/// What gives the deformed meshes of a scene their shapes at a moment.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ShapePose {
+    /// As [`Pose::object_from_bind`](crate::Pose::object_from_bind).
+    pub object_from_bind: Vec<Affine3A>,
+    /// As [`Pose::weights`](crate::Pose::weights).
+    pub weights: Vec<f32>,
+}
+
 /// A vertex of a shape in a pose.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct PosedVertex {
@@ -294,6 +303,23 @@ impl Scene {
         self.deformations.binary_search_by_key(&mesh, |deformation| deformation.mesh).ok()
     }
 
+    /// Each instance of a deformed mesh, by rising number, with a box in the object space of the mesh that holds whatever a pose makes of it
+    /// ([`Shape::bounds_in`]).
+    pub fn deformed_bounds_os(&self, pose: &ShapePose) -> Vec<(u32, Aabb)> {
+        if self.deformations.is_empty() {
+            return Vec::new();
+        }
+        let bounds_os = |d: &Deformation| {
+            let joints = pose.object_from_bind.get(d.joints(self)).unwrap_or(&[]);
+            let weights = pose.weights.get(d.weights(self)).unwrap_or(&[]);
+            self.shapes.get(d.shape as usize).map_or(Aabb::EMPTY, |shape| shape.bounds_in(weights, joints))
+        };
+        let of_deformation: Vec<Aabb> = self.deformations.iter().map(bounds_os).collect();
+        let deformed = (0..self.instances.len())
+            .filter_map(|instance| Some((instance as u32, of_deformation[self.deformation_of(instance)?])));
+        deformed.collect()
+    }
+
     /// Writes the drawn vertices of deformed meshes, and the meshes' boxes, for these joints and weights. Returns the first mesh
     /// and vertex whose place overflows.
     pub(crate) fn write_deformed(
@@ -302,6 +328,7 @@ impl Scene {
         weights: &[f32],
     ) -> Option<(u32, usize)> {
         let mut overflow = None;
+        self.shaped = ShapePose { object_from_bind: object_from_bind.to_vec(), weights: weights.to_vec() };
         for k in 0..self.deformations.len() {
             let d = self.deformations[k].clone();
             let joints = object_from_bind.get(d.joints(self)).unwrap_or(&[]);

@@ -24,7 +24,8 @@ mod tangent;
 pub mod texture;
 
 pub use deform::{
-    Deformation, Influences, JOINTS_PER_SET, JOINTS_PER_VERTEX_MAX, JointBounds, MorphTarget, Shape, Skin,
+    Deformation, Influences, JOINTS_PER_SET, JOINTS_PER_VERTEX_MAX, JointBounds, MorphTarget, Shape,
+    ShapePose, Skin,
 };
 pub use error::SceneError;
 pub use load::{LoadOptions, load, load_bytes, load_source};

@@ -325,6 +325,8 @@ pub struct Scene {
     pub deformations: Vec<crate::Deformation>,
     /// Weights of the morph targets of all deformations at rest, in the order of [`Pose::weights`](crate::Pose::weights).
     pub rest_weights: Vec<f32>,
+    /// What the drawn vertices of deformed meshes were last written for.
+    pub shaped: crate::ShapePose,
     /// Cameras that hang on nodes; none where nothing is animated.
     pub camera_nodes: Vec<crate::Attachment>,
     /// Lights that hang on nodes; none where nothing is animated. Who puts other lights into the scene clears it.

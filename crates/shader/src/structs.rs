@@ -70,6 +70,38 @@ shader_struct! {
         pub flags: u32,
     }
 
+    /// What a group of the pass `shared/deform` writes (`shared/deform/deform.comp.glsl`).
+    pub struct DeformGroup {
+        /// The deformation.
+        pub deformation: u32,
+        /// First vertex of it.
+        pub first: u32,
+    }
+
+    /// What gives the vertices of a drawn mesh their places.
+    pub struct Deformed {
+        /// First drawn vertex.
+        pub first_vertex: u32,
+        /// Vertices.
+        pub vertex_count: u32,
+        /// First vertex of its shape.
+        pub first_shape: u32,
+        /// 1 where each triangle has vertices and a normal of its own.
+        pub is_flat: u32,
+        /// Sets of four joints a vertex, 0 without a skin.
+        pub set_count: u32,
+        /// First set of its shape.
+        pub first_influence: u32,
+        /// First matrix of the pose.
+        pub first_joint: u32,
+        /// Morph targets.
+        pub target_count: u32,
+        /// First of them.
+        pub first_target: u32,
+        /// First weight of the pose.
+        pub first_weight: u32,
+    }
+
     /// A material: five texels of an RGBA32UI image (`include/scene.glsl`).
     pub struct MaterialData {
         /// Linear colour and alpha.
@@ -133,6 +165,8 @@ pub const LAYOUTS: &[crate::StructLayout] = &[
     RsmConstants::LAYOUT,
     ShadowConstants::LAYOUT,
     DrawData::LAYOUT,
+    DeformGroup::LAYOUT,
+    Deformed::LAYOUT,
     MaterialData::LAYOUT,
     LightData::LAYOUT,
 ];

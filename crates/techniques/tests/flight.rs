@@ -203,6 +203,7 @@ fn pose_of(stage: &Stage, lights: &[Light], frame: u64) -> ScenePose {
                 .map(|light| Light { position_ws: around.transform_point3(light.position_ws), ..*light })
                 .collect(),
         ),
+        shapes: None,
     }
 }
 

@@ -1,6 +1,7 @@
 //! A scene on the device: vertices, draws, materials, textures.
 
 pub mod blended;
+pub mod deformed;
 pub mod draw_list;
 pub mod draws;
 pub mod lights;
@@ -19,6 +20,7 @@ use afterlight_scene::Scene;
 pub use self::draws::{BUCKETS, Bucket, DRAW_TRIANGLES, DrawInfo, TextureFetches};
 use self::{
     blended::Blended,
+    deformed::{DeformedGpu, PosedShapes},
     draws::DrawTable,
     materials::{material_records, uses_uv1},
     pieces::compact_pieces,
@@ -59,6 +61,8 @@ pub struct SceneGpu {
     pub draw_names: Vec<[Arc<str>; 2]>,
     /// Where its surfaces stand in the pose that it was uploaded in.
     pub rest: Placed,
+    /// What skins and morph targets deform; `None` where nothing does.
+    pub deformed: Option<DeformedGpu>,
     /// What each draw is a piece of.
     pub draw_sources: Vec<DrawSource>,
     /// First draw of each bucket; one more entry for the end.
@@ -89,7 +93,8 @@ impl SceneGpu {
         let mut uploader = device.uploader()?;
         let mut warnings = Vec::new();
         let (indices, pieces) = compact_pieces(scene);
-        let draws = DrawTable::new(scene, &pieces)?;
+        let mut draws = DrawTable::new(scene, &pieces)?;
+        draws.bound_deformed(&scene.deformed_bounds_os(&scene.shaped));
         let blended =
             Blended::new(scene, &indices, &draws.data[draws.infos.len()..], draws.blended, draws.infos.len());
         let table = TextureTable::plan(scene, device.features(), &mut warnings)?;
@@ -103,6 +108,7 @@ impl SceneGpu {
         let draw_data = record_image(device, &mut uploader, "scene draw records", &draws.data, 4, uint4)?;
         let materials = record_image(device, &mut uploader, "scene materials", &materials, 8, uint4)?;
         let uv_transforms = upload_slice(device, &mut uploader, "scene texture transforms", &transforms)?;
+        let deformed = DeformedGpu::upload(device, &mut uploader, scene)?;
         let textures = table.upload(device, &mut uploader, &scene.images, progress)?;
         uploader.finish()?;
 
@@ -117,8 +123,9 @@ impl SceneGpu {
         ];
         let buffers = [&positions, &attributes, &indices, &draw_buffer, &uv_transforms];
         let images = draw_data.allocated_bytes() + materials.allocated_bytes() + textures.bytes;
+        let shapes = deformed.as_ref().map_or(0, DeformedGpu::bytes);
         Ok(Arc::new(Self {
-            bytes: buffers.iter().map(|b| b.allocated_bytes()).sum::<u64>() + images,
+            bytes: buffers.iter().map(|b| b.allocated_bytes()).sum::<u64>() + images + shapes,
             texture_set: textures.set,
             material_count: scene.materials.len() as u32,
             has_emission: scene.materials.iter().any(|m| !m.unlit && m.emissive_factor != [0.0; 3]),
@@ -127,7 +134,8 @@ impl SceneGpu {
             triangle_count: draws.infos.iter().map(|d| u64::from(d.index_count / 3)).sum(),
             vertex_count: scene.positions_os.len() as u64,
             draw_sources: draws.sources,
-            rest: Placed::new(draws.data, draws.infos, blended),
+            rest: Placed::new(draws.data, draws.infos, blended, PosedShapes::new(&scene.shaped)),
+            deformed,
             bucket_first: draws.bucket_first,
             draws: draw_buffer,
             draw_data,

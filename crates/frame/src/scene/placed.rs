@@ -4,7 +4,7 @@ use afterlight_scene::Aabb;
 use afterlight_shader::structs::{DRAW_MIRRORED, DrawData};
 use glam::Affine3A;
 
-use crate::scene::{DrawInfo, blended::Blended, draw_list::displaced};
+use crate::scene::{DrawInfo, blended::Blended, deformed::PosedShapes, draw_list::displaced};
 
 /// What a draw is a piece of.
 #[derive(Clone, Copy, Debug)]
@@ -24,6 +24,8 @@ pub struct Placed {
     pub infos: Vec<DrawInfo>,
     /// Draws with alpha blending.
     pub blended: Blended,
+    /// Joints and weights that give deformed meshes their shapes.
+    pub shapes: PosedShapes,
     /// Box of the draws in buckets, and of those with alpha blending: kept, since every frame asks and scenes have many draws.
     bounds_ws: [Aabb; 2],
 }
@@ -37,9 +39,14 @@ pub struct TurnedOver {
 
 impl Placed {
     /// Draws where their records and bounds say.
-    pub(super) fn new(records: Vec<DrawData>, infos: Vec<DrawInfo>, blended: Blended) -> Self {
+    pub(super) fn new(
+        records: Vec<DrawData>,
+        infos: Vec<DrawInfo>,
+        blended: Blended,
+        shapes: PosedShapes,
+    ) -> Self {
         let bounds_ws = find_bounds(&infos, &blended);
-        Self { records, infos, blended, bounds_ws }
+        Self { records, infos, blended, shapes, bounds_ws }
     }
 
     /// Box of all surfaces without alpha blending in world space, which displacement moves along each axis at most as far as said, m.
@@ -52,7 +59,8 @@ impl Placed {
         self.bounds_ws(displacement_m).union(&displaced(&self.bounds_ws[1], displacement_m))
     }
 
-    /// Moves all draws to where their instances are: `sources` has one entry a draw, `world_from_objects` one an instance.
+    /// Moves all draws to where their instances are: `sources` has one entry a draw, `world_from_objects` one an instance. `deformed` has the
+    /// boxes, object space, of instances whose shapes a pose changes, by rising number of the instance.
     ///
     /// # Errors
     /// [`TurnedOver`], after which what is placed is undefined.
@@ -60,6 +68,7 @@ impl Placed {
         &mut self,
         sources: &[DrawSource],
         world_from_objects: &[Affine3A],
+        deformed: &[(u32, Aabb)],
     ) -> Result<(), TurnedOver> {
         let in_buckets = self.infos.len();
         for (i, (record, source)) in self.records.iter_mut().zip(sources).enumerate() {
@@ -69,11 +78,13 @@ impl Placed {
                 return Err(TurnedOver { instance: source.instance });
             }
             let rows = object_rows(m);
-            if rows == [record.object_row0, record.object_row1, record.object_row2] {
+            let reshaped = deformed.binary_search_by_key(&source.instance, |(instance, _)| *instance).ok();
+            let is_still = rows == [record.object_row0, record.object_row1, record.object_row2];
+            if is_still && reshaped.is_none() {
                 continue;
             }
             [record.object_row0, record.object_row1, record.object_row2] = rows;
-            let bounds_ws = source.bounds_os.transformed(m);
+            let bounds_ws = reshaped.map_or(source.bounds_os, |at| deformed[at].1).transformed(m);
             match i.checked_sub(in_buckets) {
                 None => self.infos[i].bounds_ws = bounds_ws,
                 Some(place) => self.blended.place(place, record, bounds_ws),
@@ -95,4 +106,11 @@ pub(super) fn object_rows(m: &Affine3A) -> [[f32; 4]; 3] {
         let row = m.matrix3.row(i);
         [row.x, row.y, row.z, m.translation[i]]
     })
+}
+
+/// The matrix that a draw's record has the rows of.
+pub(super) fn world_from_object(record: &DrawData) -> Affine3A {
+    let [x, y, z] = [record.object_row0, record.object_row1, record.object_row2].map(glam::Vec4::from);
+    let rows = glam::Mat3A::from_cols(x.truncate().into(), y.truncate().into(), z.truncate().into());
+    Affine3A { matrix3: rows.transpose(), translation: glam::Vec3A::new(x.w, y.w, z.w) }
 }

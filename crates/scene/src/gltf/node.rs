@@ -18,8 +18,8 @@ use serde::Deserialize;
 
 use super::{accessor::Accessors, check, mesh::Variant};
 use crate::{
-    Attachment, Camera, Instance, Light, LightKind, Node, Projection, Scene, SceneError, Skin, animation,
-    pose,
+    Attachment, Camera, Instance, Light, LightKind, Node, Projection, Scene, SceneError, ShapePose, Skin,
+    animation, pose,
 };
 
 /// What is counted against [`INSTANCE_COUNT_MAX`], for messages.
@@ -411,6 +411,13 @@ pub(super) fn make_instances(
         worlds.resize(scene.instances.len(), file_from_object);
     }
     scene.settle(&worlds);
+    if !scene.deformations.is_empty() {
+        // Meshes that have moved in their node's space have their joints seen from another place.
+        let playing = time_s.and_then(|time_s| scene.animations.first().map(|a| (a, a.wrap(time_s))));
+        scene.file_from_nodes_into(playing, &mut file_from_nodes);
+        scene.joints_into(&file_from_nodes, &mut joints);
+        scene.shaped = ShapePose { object_from_bind: joints, weights };
+    }
     Ok(())
 }
 
