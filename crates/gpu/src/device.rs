@@ -45,6 +45,8 @@ pub(crate) struct DeviceInner {
     pub memory: vk::PhysicalDeviceMemoryProperties,
     pub queue_family: u32,
     without_float_stencil: bool,
+    /// Whether another program owns device and instance.
+    is_adopted: bool,
     queue: Mutex<Queue>,
     /// Counts submissions: its value is the number of the last one that is done, and all before it are.
     timeline: vk::Semaphore,
@@ -113,58 +115,7 @@ impl Device {
         let raw = create_device(&instance, physical, &detected)?;
         // SAFETY: the device was created with one queue of this family.
         let queue = unsafe { raw.get_device_queue(detected.queue_family, 0) };
-        let allocator = Allocator::new(&AllocatorCreateDesc {
-            instance: instance.raw.clone(),
-            device: raw.clone(),
-            physical_device: physical,
-            debug_settings: Default::default(),
-            buffer_device_address: detected.features.buffer_device_address,
-            allocation_sizes: Default::default(),
-        });
-        let allocator = match allocator {
-            Ok(allocator) => allocator,
-            Err(error) => {
-                // SAFETY: nothing has been made of the device yet.
-                unsafe { raw.destroy_device(None) };
-                return Err(GpuError::MissingFeature {
-                    device: detected.info.name,
-                    missing: error.to_string(),
-                });
-            }
-        };
-        let timeline = match create_timeline(&raw) {
-            Ok(timeline) => timeline,
-            Err(error) => {
-                drop(allocator);
-                // SAFETY: nothing that was made of the device is left.
-                unsafe { raw.destroy_device(None) };
-                return Err(error);
-            }
-        };
-        let Detected { info, features, queue_family, .. } = detected;
-        let pipelines = PipelineStore::new(&raw, &info, options.pipeline_cache_dir.as_deref());
-        // SAFETY: `physical` belongs to the instance.
-        let memory = unsafe { instance.raw.get_physical_device_memory_properties(physical) };
-        Ok(Device(Arc::new(DeviceInner {
-            push: khr::push_descriptor::Device::new(&instance.raw, &raw),
-            debug: instance.has_debug_utils.then(|| ext::debug_utils::Device::new(&instance.raw, &raw)),
-            info,
-            features,
-            physical,
-            memory,
-            queue_family,
-            without_float_stencil: options.without_float_stencil,
-            queue: Mutex::new(Queue { raw: queue, submitted: 0 }),
-            timeline,
-            held_bytes: AtomicU64::new(0),
-            allocator: Mutex::new(Some(allocator)),
-            set_layouts: SetLayoutCache::default(),
-            pipelines,
-            samplers: SamplerStore::default(),
-            recorders: Mutex::new(Vec::new()),
-            raw,
-            instance,
-        })))
+        from_opened(Opened { instance, raw, physical, queue, is_adopted: false, detected }, options)
     }
 
     /// Pipelines that were made so far. They are kept: what was asked for once is there.
@@ -182,12 +133,16 @@ impl Device {
         &self.0.features
     }
 
-    /// Waits until the device has nothing left to do.
+    /// Waits until the device has nothing left to do; one that is adopted, until it has done what Afterlight submitted.
     ///
     /// # Errors
     /// [`GpuError::DeviceLost`].
     pub fn wait_idle(&self) -> Result<(), GpuError> {
-        let _queue = lock(&self.0.queue);
+        let queue = lock(&self.0.queue);
+        if self.0.is_adopted {
+            // Other threads may submit to other queues of the device meanwhile, which `vkDeviceWaitIdle` forbids.
+            return self.wait_for(queue.submitted).map_err(lost("vkWaitSemaphores", "unknown"));
+        }
         // SAFETY: the queue is locked, as `vkDeviceWaitIdle` asks.
         unsafe { self.0.raw.device_wait_idle() }.map_err(lost("vkDeviceWaitIdle", "unknown"))
     }
@@ -231,7 +186,7 @@ impl Device {
     /// # Errors
     /// A driver that cannot give a command pool.
     pub fn encoder(&self) -> Result<Encoder, GpuError> {
-        self.encoder_for(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT)
+        Encoder::new(self.clone(), self.recorder()?, vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT)
     }
 
     /// Begins to record commands that are submitted many times ([`Encoder::finish`]).
@@ -239,12 +194,16 @@ impl Device {
     /// # Errors
     /// A driver that cannot give a command pool.
     pub fn encoder_for_many(&self) -> Result<Encoder, GpuError> {
-        self.encoder_for(vk::CommandBufferUsageFlags::empty())
+        Encoder::new(self.clone(), self.recorder()?, vk::CommandBufferUsageFlags::empty())
     }
 
-    fn encoder_for(&self, how_often: vk::CommandBufferUsageFlags) -> Result<Encoder, GpuError> {
-        let recorder = self.recorder()?;
-        Encoder::new(self.clone(), recorder, how_often)
+    /// Begins to record commands that another program's command buffer executes ([`Device::execute_in`]), any number of times.
+    ///
+    /// # Errors
+    /// A driver that cannot give a command pool.
+    pub fn encoder_for_callers(&self) -> Result<Encoder, GpuError> {
+        let recorder = self.recorder_of(vk::CommandBufferLevel::SECONDARY)?;
+        Encoder::new(self.clone(), recorder, vk::CommandBufferUsageFlags::empty())
     }
 
     /// Submits what `encoder` recorded, waits for it and returns its timestamps and statistics.
@@ -262,12 +221,25 @@ impl Device {
 
     /// One that nobody uses at the moment, or a new one.
     pub(crate) fn recorder(&self) -> Result<Recorder, GpuError> {
-        let idle = lock(&self.0.recorders).pop();
-        idle.map_or_else(|| Recorder::new(self), Ok)
+        self.recorder_of(vk::CommandBufferLevel::PRIMARY)
+    }
+
+    fn recorder_of(&self, level: vk::CommandBufferLevel) -> Result<Recorder, GpuError> {
+        let idle = {
+            let mut idle = lock(&self.0.recorders);
+            idle.iter().rposition(|recorder| recorder.level == level).map(|at| idle.swap_remove(at))
+        };
+        idle.map_or_else(|| Recorder::new(self, level), Ok)
     }
 
     pub(crate) fn give_back(&self, recorder: Recorder) {
         lock(&self.0.recorders).push(recorder);
+    }
+
+    /// Calls `with` with the queue locked.
+    pub(crate) fn queue_locked<T>(&self, with: impl FnOnce(vk::Queue) -> T) -> T {
+        let queue = lock(&self.0.queue);
+        with(queue.raw)
     }
 
     /// Submits one command buffer, whose resources the caller holds until the submission is done.
@@ -346,7 +318,10 @@ impl Drop for DeviceInner {
         // SAFETY: every resource holds the device, so none but the device's own objects are left, and no thread can
         // still be using them. Waiting may fail on a lost device; destroying is right all the same.
         unsafe {
-            let _ = self.raw.device_wait_idle();
+            // Of a device that is adopted, recordings and uploads have waited for their own submissions when they were dropped.
+            if !self.is_adopted {
+                let _ = self.raw.device_wait_idle();
+            }
             let mut allocator = lock(&self.allocator).take();
             for recorder in lock(&self.recorders).drain(..) {
                 recorder.destroy(&self.raw, allocator.as_mut());
@@ -358,9 +333,80 @@ impl Drop for DeviceInner {
             self.samplers.destroy(&self.raw);
             self.raw.destroy_semaphore(self.timeline, None);
             drop(allocator);
-            self.raw.destroy_device(None);
+            if !self.is_adopted {
+                self.raw.destroy_device(None);
+            }
         }
     }
+}
+
+/// A device that is open, with nothing made of it yet.
+pub(crate) struct Opened {
+    pub instance: Instance,
+    pub raw: ash::Device,
+    pub physical: vk::PhysicalDevice,
+    pub queue: vk::Queue,
+    pub is_adopted: bool,
+    pub detected: Detected,
+}
+
+/// Makes what all resources share. A device of its own is destroyed where that fails.
+pub(crate) fn from_opened(opened: Opened, options: &DeviceOptions) -> Result<Device, GpuError> {
+    let Opened { instance, raw, physical, queue, is_adopted, detected } = opened;
+    let destroy = || {
+        if !is_adopted {
+            // SAFETY: nothing that was made of the device is left.
+            unsafe { raw.destroy_device(None) };
+        }
+    };
+    let allocator = Allocator::new(&AllocatorCreateDesc {
+        instance: instance.raw.clone(),
+        device: raw.clone(),
+        physical_device: physical,
+        debug_settings: Default::default(),
+        buffer_device_address: detected.features.buffer_device_address,
+        allocation_sizes: Default::default(),
+    });
+    let allocator = match allocator {
+        Ok(allocator) => allocator,
+        Err(error) => {
+            destroy();
+            return Err(GpuError::MissingFeature { device: detected.info.name, missing: error.to_string() });
+        }
+    };
+    let timeline = match create_timeline(&raw) {
+        Ok(timeline) => timeline,
+        Err(error) => {
+            drop(allocator);
+            destroy();
+            return Err(error);
+        }
+    };
+    let Detected { info, features, queue_family, .. } = detected;
+    let pipelines = PipelineStore::new(&raw, &info, options.pipeline_cache_dir.as_deref());
+    // SAFETY: `physical` belongs to the instance.
+    let memory = unsafe { instance.raw.get_physical_device_memory_properties(physical) };
+    Ok(Device(Arc::new(DeviceInner {
+        push: khr::push_descriptor::Device::new(&instance.raw, &raw),
+        debug: instance.has_debug_utils.then(|| ext::debug_utils::Device::new(&instance.raw, &raw)),
+        info,
+        features,
+        physical,
+        memory,
+        queue_family,
+        without_float_stencil: options.without_float_stencil,
+        is_adopted,
+        queue: Mutex::new(Queue { raw: queue, submitted: 0 }),
+        timeline,
+        held_bytes: AtomicU64::new(0),
+        allocator: Mutex::new(Some(allocator)),
+        set_layouts: SetLayoutCache::default(),
+        pipelines,
+        samplers: SamplerStore::default(),
+        recorders: Mutex::new(Vec::new()),
+        raw,
+        instance,
+    })))
 }
 
 /// Picks by index, by part of the name, or the most able.
@@ -407,38 +453,18 @@ fn create_timeline(device: &ash::Device) -> Result<vk::Semaphore, GpuError> {
     unsafe { device.create_semaphore(&info, None) }.map_err(GpuError::call("vkCreateSemaphore"))
 }
 
-fn create_device(
+pub(crate) fn create_device(
     instance: &Instance,
     physical: vk::PhysicalDevice,
     detected: &Detected,
 ) -> Result<ash::Device, GpuError> {
-    let enable = &detected.enable;
-    let (mut v11, mut v12, mut v13) = (enable.v11, enable.v12, enable.v13);
-    let (mut shading_rate, mut barycentric) = (enable.shading_rate, enable.barycentric);
-    let (mut mesh, mut interlock) = (enable.mesh, enable.interlock);
-    let extensions: Vec<_> = enable.extensions.iter().map(|e| e.as_ptr()).collect();
-    let has = |name: &std::ffi::CStr| enable.extensions.contains(&name);
+    let mut enable = detected.enable.clone();
+    let extensions: Vec<_> = detected.enable.extensions.iter().map(|e| e.as_ptr()).collect();
     let priorities = [1.0];
     let queues = [vk::DeviceQueueCreateInfo::default()
         .queue_family_index(detected.queue_family)
         .queue_priorities(&priorities)];
-    let mut features = vk::PhysicalDeviceFeatures2::default()
-        .features(enable.core)
-        .push_next(&mut v11)
-        .push_next(&mut v12)
-        .push_next(&mut v13);
-    if has(khr::fragment_shading_rate::NAME) {
-        features = features.push_next(&mut shading_rate);
-    }
-    if has(khr::fragment_shader_barycentric::NAME) {
-        features = features.push_next(&mut barycentric);
-    }
-    if has(ext::mesh_shader::NAME) {
-        features = features.push_next(&mut mesh);
-    }
-    if has(ext::fragment_shader_interlock::NAME) {
-        features = features.push_next(&mut interlock);
-    }
+    let mut features = enable.chain();
     let create = vk::DeviceCreateInfo::default()
         .queue_create_infos(&queues)
         .enabled_extension_names(&extensions)

@@ -92,6 +92,15 @@ pub enum GpuError {
         /// The use asked for.
         usage: vk::ImageUsageFlags,
     },
+    /// A picture cannot be put into an image of this format.
+    #[error("the target of a picture is {found:?}, expected R8G8B8A8_UNORM, R8G8B8A8_SRGB or B8G8R8A8_UNORM")]
+    TargetFormat {
+        /// The image's format.
+        found: vk::Format,
+    },
+    /// Commands are in another program's command buffer, which has not said that the device is done with it.
+    #[error("a frame is still in the caller's command buffer, expected to hear that it is done")]
+    WithCaller,
     /// A shader or the pipeline around it was refused.
     #[error("shader {name}: {reason}")]
     Shader {

@@ -1,5 +1,6 @@
 //! What a device is and what it can do, as plain data.
 
+use crate::adopt::{Adopted, missing_of_opened};
 use ash::{khr, vk};
 
 /// Which device it is.
@@ -234,6 +235,7 @@ impl Features {
 }
 
 /// The features to enable, kept together since they are chained by pointers.
+#[derive(Clone)]
 pub(crate) struct Enable {
     pub core: vk::PhysicalDeviceFeatures,
     pub v11: vk::PhysicalDeviceVulkan11Features<'static>,
@@ -261,11 +263,127 @@ macro_rules! take {
 
 /// Examines `physical`: properties, features, extensions, queues.
 pub(crate) fn detect(instance: &ash::Instance, physical: vk::PhysicalDevice, index: u32) -> Detected {
+    let extensions = device_extensions(instance, physical);
+    let has = |name: &std::ffi::CStr| extensions.iter().any(|e| e.as_c_str() == name);
+    detect_with(instance, physical, index, &has, None)
+}
+
+/// Examines a device that was opened already: what was not enabled is not there.
+///
+/// # Safety
+/// The handles are alive and belong together; every structure in the chain of features is what its `sType` says.
+pub(crate) unsafe fn detect_opened(adopted: &Adopted<'_>) -> Detected {
+    let has = |name: &std::ffi::CStr| adopted.extensions.contains(&name);
+    // SAFETY: the caller promises that the chain is valid.
+    let opened = unsafe { OpenedFeatures::of(adopted.features) };
+    let mut detected = detect_with(&adopted.instance, adopted.physical, 0, &has, Some(&opened));
+    detected.queue_family = adopted.queue_family;
+    // SAFETY: the physical device belongs to the instance.
+    let families = unsafe { adopted.instance.get_physical_device_queue_family_properties(adopted.physical) };
+    let family = families.get(adopted.queue_family as usize);
+    let wanted = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;
+    if !family.is_some_and(|family| family.queue_flags.contains(wanted)) {
+        detected.missing.push("graphics and compute on the queue");
+    }
+    detected.features.timestamp_valid_bits = family.map_or(0, |family| family.timestamp_valid_bits);
+    detected
+}
+
+/// The features that a device was opened with.
+#[derive(Default)]
+struct OpenedFeatures {
+    core: vk::PhysicalDeviceFeatures,
+    v11: vk::PhysicalDeviceVulkan11Features<'static>,
+    v12: vk::PhysicalDeviceVulkan12Features<'static>,
+    v13: vk::PhysicalDeviceVulkan13Features<'static>,
+    shading_rate: vk::PhysicalDeviceFragmentShadingRateFeaturesKHR<'static>,
+    barycentric: vk::PhysicalDeviceFragmentShaderBarycentricFeaturesKHR<'static>,
+    mesh: vk::PhysicalDeviceMeshShaderFeaturesEXT<'static>,
+    interlock: vk::PhysicalDeviceFragmentShaderInterlockFeaturesEXT<'static>,
+}
+
+impl OpenedFeatures {
+    /// # Safety
+    /// Every structure in the chain is what its `sType` says.
+    unsafe fn of(features: &vk::PhysicalDeviceFeatures2<'_>) -> OpenedFeatures {
+        let mut opened = OpenedFeatures { core: features.features, ..OpenedFeatures::default() };
+        let mut next = features.p_next.cast::<vk::BaseInStructure<'_>>().cast_const();
+        macro_rules! copy {
+            ($($field:ident: $type:ident),* $(,)?) => {
+                // SAFETY: the caller promises that `next` is null or a structure of the type that it says. What is copied has its own end
+                // of the chain.
+                unsafe {
+                    while let Some(base) = next.as_ref() {
+                        match base.s_type {
+                            $(<vk::$type<'_> as vk::TaggedStructure>::STRUCTURE_TYPE => {
+                                opened.$field = *next.cast::<vk::$type<'static>>();
+                                opened.$field.p_next = std::ptr::null_mut();
+                            })*
+                            _ => {}
+                        }
+                        next = base.p_next;
+                    }
+                }
+            };
+        }
+        copy!(
+            v11: PhysicalDeviceVulkan11Features,
+            v12: PhysicalDeviceVulkan12Features,
+            v13: PhysicalDeviceVulkan13Features,
+            shading_rate: PhysicalDeviceFragmentShadingRateFeaturesKHR,
+            barycentric: PhysicalDeviceFragmentShaderBarycentricFeaturesKHR,
+            mesh: PhysicalDeviceMeshShaderFeaturesEXT,
+            interlock: PhysicalDeviceFragmentShaderInterlockFeaturesEXT,
+        );
+        opened
+    }
+}
+
+impl Enable {
+    /// The features as a chain for `VkDeviceCreateInfo::pNext`.
+    pub fn chain(&mut self) -> vk::PhysicalDeviceFeatures2<'_> {
+        let has = |name: &std::ffi::CStr| self.extensions.contains(&name);
+        let (rate, barycentric) =
+            (has(khr::fragment_shading_rate::NAME), has(khr::fragment_shader_barycentric::NAME));
+        let (mesh, interlock) =
+            (has(ash::ext::mesh_shader::NAME), has(ash::ext::fragment_shader_interlock::NAME));
+        // What an earlier chain has linked is linked anew.
+        let none = std::ptr::null_mut();
+        (self.v11.p_next, self.v12.p_next, self.v13.p_next) = (none, none, none);
+        (self.shading_rate.p_next, self.barycentric.p_next) = (none, none);
+        (self.mesh.p_next, self.interlock.p_next) = (none, none);
+        let mut features = vk::PhysicalDeviceFeatures2::default()
+            .features(self.core)
+            .push_next(&mut self.v11)
+            .push_next(&mut self.v12)
+            .push_next(&mut self.v13);
+        if rate {
+            features = features.push_next(&mut self.shading_rate);
+        }
+        if barycentric {
+            features = features.push_next(&mut self.barycentric);
+        }
+        if mesh {
+            features = features.push_next(&mut self.mesh);
+        }
+        if interlock {
+            features = features.push_next(&mut self.interlock);
+        }
+        features
+    }
+}
+
+/// Examines `physical`, whose extensions `has` tells; where it was opened already, of its features those that are enabled.
+fn detect_with(
+    instance: &ash::Instance,
+    physical: vk::PhysicalDevice,
+    index: u32,
+    has: &dyn Fn(&std::ffi::CStr) -> bool,
+    opened: Option<&OpenedFeatures>,
+) -> Detected {
     // SAFETY: `physical` was enumerated from `instance`, which is alive; so for every query of this function.
     let base = unsafe { instance.get_physical_device_properties(physical) };
     let is_13 = base.api_version >= vk::API_VERSION_1_3;
-    let extensions = device_extensions(instance, physical);
-    let has = |name: &std::ffi::CStr| extensions.iter().any(|e| e.as_c_str() == name);
 
     let mut missing = Vec::new();
     if !is_13 {
@@ -321,6 +439,13 @@ pub(crate) fn detect(instance: &ash::Instance, physical: vk::PhysicalDevice, ind
         unsafe { instance.get_physical_device_features2(physical, &mut features) };
         core = features.features;
     }
+    if let Some(opened) = opened {
+        core = opened.core;
+        (f11, f12, f13) = (opened.v11, opened.v12, opened.v13);
+        (shading_rate, barycentric) = (opened.shading_rate, opened.barycentric);
+        (mesh, interlock) = (opened.mesh, opened.interlock);
+        missing.extend(missing_of_opened(&f12, &f13));
+    }
 
     let operations = vk::SubgroupFeatureFlags::ARITHMETIC | vk::SubgroupFeatureFlags::BALLOT;
     if is_13
@@ -340,7 +465,7 @@ pub(crate) fn detect(instance: &ash::Instance, physical: vk::PhysicalDevice, ind
     let timestamp_valid_bits = queue_family.map_or(0, |f| families[f].timestamp_valid_bits);
     let queue_family = queue_family.unwrap_or(0) as u32;
 
-    let enable = choose(&core, &f11, &f12, &f13, shading_rate, barycentric, mesh, interlock, &has);
+    let enable = choose(&core, &f11, &f12, &f13, shading_rate, barycentric, mesh, interlock, has);
     // SAFETY: `physical` belongs to `instance`.
     let memory = unsafe { instance.get_physical_device_memory_properties(physical) };
     let info = DeviceInfo {

@@ -59,6 +59,8 @@ pub(crate) struct Instance {
     /// Whether `VK_EXT_debug_utils` is enabled: names and labels may be given.
     pub has_debug_utils: bool,
     messenger: Option<(ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
+    /// Whether another program owns it.
+    is_adopted: bool,
 }
 
 /// The loader, opened once for the life of the process: unloading it would unload drivers that keep threads.
@@ -130,7 +132,7 @@ impl Instance {
             }
             result => GpuError::Vulkan { call: "vkCreateInstance", result },
         })?;
-        let mut instance = Instance { raw, log, has_debug_utils, messenger: None };
+        let mut instance = Instance { raw, log, has_debug_utils, messenger: None, is_adopted: false };
         if validate {
             let debug = ext::debug_utils::Instance::new(entry, &instance.raw);
             let info = self::messenger_info(&instance.log);
@@ -140,6 +142,12 @@ impl Instance {
             instance.messenger = Some((debug, messenger));
         }
         Ok(instance)
+    }
+
+    /// An instance that another program owns.
+    pub fn adopted(raw: ash::Instance, has_debug_utils: bool) -> Instance {
+        let log = Arc::new(ValidationLog::default());
+        Instance { raw, log, has_debug_utils, messenger: None, is_adopted: true }
     }
 
     /// All physical devices in the loader's order, examined.
@@ -162,7 +170,9 @@ impl Drop for Instance {
             if let Some((debug, messenger)) = self.messenger.take() {
                 debug.destroy_debug_utils_messenger(messenger, None);
             }
-            self.raw.destroy_instance(None);
+            if !self.is_adopted {
+                self.raw.destroy_instance(None);
+            }
         }
     }
 }

@@ -15,7 +15,9 @@
 //! detected into [`Features`] and enabled where present.
 #![allow(unsafe_code)]
 
+mod adopt;
 mod cache;
+mod callers;
 mod descriptor;
 mod device;
 mod encoder;
@@ -33,6 +35,8 @@ mod upload;
 
 pub use ash::vk;
 
+pub use adopt::{Adopted, Needs};
+pub use callers::{CallersCommands, Target};
 pub use descriptor::{DescriptorSet, PushSet, SetLayoutDesc, SlotLayout, SlotResource, SlotWrite};
 pub use device::{Device, DeviceOptions, Listed};
 pub use encoder::{

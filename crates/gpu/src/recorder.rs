@@ -17,6 +17,8 @@ pub(crate) const CHECKPOINTS_MAX: usize = 1024;
 pub(crate) struct Recorder {
     pool: vk::CommandPool,
     pub commands: vk::CommandBuffer,
+    /// Primary commands are submitted, secondary ones executed by another program's.
+    pub level: vk::CommandBufferLevel,
     pub timestamp_pools: Vec<vk::QueryPool>,
     pub statistics_pools: Vec<vk::QueryPool>,
     pub checkpoints: Option<Checkpoints>,
@@ -34,7 +36,7 @@ pub(crate) struct Checkpoints {
 unsafe impl Send for Recorder {}
 
 impl Recorder {
-    pub fn new(device: &Device) -> Result<Recorder, GpuError> {
+    pub fn new(device: &Device, level: vk::CommandBufferLevel) -> Result<Recorder, GpuError> {
         let raw = &device.0.raw;
         let info = vk::CommandPoolCreateInfo::default()
             .queue_family_index(device.0.queue_family)
@@ -45,14 +47,13 @@ impl Recorder {
         let mut recorder = Recorder {
             pool,
             commands: vk::CommandBuffer::null(),
+            level,
             timestamp_pools: Vec::new(),
             statistics_pools: Vec::new(),
             checkpoints: None,
         };
-        let info = vk::CommandBufferAllocateInfo::default()
-            .command_pool(pool)
-            .level(vk::CommandBufferLevel::PRIMARY)
-            .command_buffer_count(1);
+        let info =
+            vk::CommandBufferAllocateInfo::default().command_pool(pool).level(level).command_buffer_count(1);
         // SAFETY: the pool was just made.
         let made = unsafe { raw.allocate_command_buffers(&info) }
             .map_err(GpuError::call("vkAllocateCommandBuffers"))
@@ -85,7 +86,9 @@ impl Recorder {
             device
                 .reset_command_pool(self.pool, vk::CommandPoolResetFlags::empty())
                 .map_err(GpuError::call("vkResetCommandPool"))?;
-            let info = vk::CommandBufferBeginInfo::default().flags(usage);
+            // What primary commands ignore; secondary ones inherit nothing.
+            let inherits = vk::CommandBufferInheritanceInfo::default();
+            let info = vk::CommandBufferBeginInfo::default().flags(usage).inheritance_info(&inherits);
             device.begin_command_buffer(self.commands, &info).map_err(GpuError::call("vkBeginCommandBuffer"))
         }
     }
@@ -180,20 +183,22 @@ pub(crate) fn query_pool(
     Ok(pools[place])
 }
 
-/// Puts the results of the first `count` queries into `results`, in order.
+/// Puts the results of the first `count` queries into `results`, in order. Returns whether all are there: those of commands that were
+/// never submitted are not.
 pub(crate) fn query_results<T: bytemuck::Pod>(
     device: &ash::Device,
     pools: &[vk::QueryPool],
     count: u32,
     results: &mut Vec<T>,
-) -> Result<(), GpuError> {
+) -> Result<bool, GpuError> {
     results.clear();
     results.resize(count as usize, T::zeroed());
-    let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
     for (part, &pool) in results.chunks_mut(QUERIES_PER_POOL as usize).zip(pools) {
         // SAFETY: all of these queries were used in a submission that is done; `T` is as many u64 as a query gives.
-        unsafe { device.get_query_pool_results(pool, 0, part, flags) }
-            .map_err(lost("vkGetQueryPoolResults", "all"))?;
+        match unsafe { device.get_query_pool_results(pool, 0, part, vk::QueryResultFlags::TYPE_64) } {
+            Err(vk::Result::NOT_READY) => return Ok(false),
+            result => result.map_err(lost("vkGetQueryPoolResults", "all"))?,
+        }
     }
-    Ok(())
+    Ok(true)
 }

@@ -17,6 +17,8 @@ pub struct Recording {
     statistics_count: u32,
     /// The last submission, if it may still run.
     running: Option<Submission>,
+    /// Whether another program's command buffer has them.
+    is_with_caller: bool,
     /// What the device counted since the queries were reset, as it gives it.
     counts: Vec<[u64; 7]>,
     has_run: bool,
@@ -38,6 +40,7 @@ impl Recording {
             timestamp_count,
             statistics_count,
             running: None,
+            is_with_caller: false,
             counts: Vec::new(),
             has_run: false,
         }
@@ -49,6 +52,16 @@ impl Recording {
     /// [`GpuError::DeviceLost`], a submission that the driver refuses.
     pub fn submit(&mut self) -> Result<(), GpuError> {
         self.wait()?;
+        let commands = self.make_ready();
+        let submitted =
+            self.device.submit_raw(commands).map_err(|result| self.lost("vkQueueSubmit2", result))?;
+        self.running = Some(submitted);
+        self.has_run = true;
+        Ok(())
+    }
+
+    /// Makes queries and checkpoints ready for the commands to run once more, and returns the commands.
+    fn make_ready(&mut self) -> ash::vk::CommandBuffer {
         let label_count = self.labels.len();
         let recorder = self.recorder.as_mut().expect("a recording has its recorder until it is dropped");
         if self.has_run {
@@ -57,12 +70,24 @@ impl Recording {
         if let Some(checkpoints) = &mut recorder.checkpoints {
             checkpoints.clear(label_count);
         }
-        let commands = recorder.commands;
-        let submitted =
-            self.device.submit_raw(commands).map_err(|result| self.lost("vkQueueSubmit2", result))?;
-        self.running = Some(submitted);
-        self.has_run = true;
-        Ok(())
+        recorder.commands
+    }
+
+    /// Hands the commands over to another program's command buffer, until [`Recording::release_from_caller`].
+    pub(crate) fn hand_over(&mut self) -> ash::vk::CommandBuffer {
+        assert!(
+            self.running.is_none() && !self.is_with_caller,
+            "commands that may still run are handed over"
+        );
+        let commands = self.make_ready();
+        (self.is_with_caller, self.has_run) = (true, true);
+        commands
+    }
+
+    /// The device is done with the command buffer that has the commands, or it will never be submitted: see
+    /// [`CallersCommands`](crate::CallersCommands).
+    pub fn release_from_caller(&mut self) {
+        self.is_with_caller = false;
     }
 
     /// Whether the device has nothing of it left to do.
@@ -70,15 +95,18 @@ impl Recording {
     /// # Errors
     /// [`GpuError::DeviceLost`].
     pub fn is_done(&self) -> Result<bool, GpuError> {
-        let Some(submission) = self.running else { return Ok(true) };
+        let Some(submission) = self.running else { return Ok(!self.is_with_caller) };
         self.device.has_done(submission).map_err(|result| self.lost("vkGetSemaphoreCounterValue", result))
     }
 
     /// Waits until the last submission is done.
     ///
     /// # Errors
-    /// [`GpuError::DeviceLost`] with the last label whose end was reached.
+    /// [`GpuError::DeviceLost`] with the last label whose end was reached; [`GpuError::WithCaller`].
     pub fn wait(&mut self) -> Result<(), GpuError> {
+        if self.is_with_caller {
+            return Err(GpuError::WithCaller);
+        }
         if let Some(submission) = self.running {
             self.device.wait_for(submission).map_err(|result| self.lost("vkWaitSemaphores", result))?;
             self.running = None;
@@ -107,7 +135,10 @@ impl Recording {
         let raw = &self.device.0.raw;
         let recorder = self.recorder.as_ref().expect("a recording has its recorder until it is dropped");
         let timestamp_count = if valid_bits > 0 { self.timestamp_count } else { 0 };
-        query_results::<u64>(raw, &recorder.timestamp_pools, timestamp_count, &mut completed.ticks)?;
+        if !query_results::<u64>(raw, &recorder.timestamp_pools, timestamp_count, &mut completed.ticks)? {
+            // The caller's command buffer was never submitted.
+            completed.tick_mask = 0;
+        }
         let statistics_count = if features.pipeline_statistics { self.statistics_count } else { 0 };
         query_results::<[u64; 7]>(raw, &recorder.statistics_pools, statistics_count, &mut self.counts)?;
         completed.statistics.clear();

@@ -9,7 +9,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use afterlight_graph::{FrameSlot, FrameTimes, ResourceId};
+use afterlight_graph::{FrameSlot, FrameTimes, ResourceId, gpu};
 use afterlight_scene::{Aabb, Camera, Light, Pose, Scene, ShapePose};
 use glam::Affine3A;
 
@@ -143,6 +143,9 @@ struct Flying {
     events: Vec<Event>,
 }
 
+/// What sends a frame on its way.
+type Sending<'a> = dyn FnMut(&mut Place, &Prepared) -> Result<(), TechniqueError> + 'a;
+
 /// A technique that draws frame after frame.
 pub struct Flight<'r> {
     renderer: &'r Renderer,
@@ -157,6 +160,8 @@ pub struct Flight<'r> {
     shown: Option<FrameContext>,
     /// In the order of their frames, the oldest first.
     places: VecDeque<Place>,
+    /// Whether frames go into another program's command buffers; none of them is submitted or waited for.
+    for_callers: bool,
 }
 
 impl Renderer {
@@ -171,6 +176,17 @@ impl Renderer {
         camera: &Camera,
         options: FlightOptions,
     ) -> Result<Flight<'r>, TechniqueError> {
+        self.fly_for(technique, params, camera, options, false)
+    }
+
+    pub(crate) fn fly_for<'r>(
+        &'r self,
+        technique: &'r dyn Technique,
+        params: &Params,
+        camera: &Camera,
+        options: FlightOptions,
+        for_callers: bool,
+    ) -> Result<Flight<'r>, TechniqueError> {
         let params = completed(technique, params);
         let recipe = Recipe { technique, params: &params, moves: true, scene_moves: options.scene_moves };
         let prepared = self.prepare_to_move(&recipe, camera)?;
@@ -184,6 +200,7 @@ impl Renderer {
             prepared,
             shown: None,
             places: VecDeque::new(),
+            for_callers,
         };
         // Ahead of the frames that need them.
         for _ in 0..options.in_flight.max(1) {
@@ -206,6 +223,24 @@ impl Flight<'_> {
         done: &mut dyn FnMut(&Done<'_>) -> Result<(), TechniqueError>,
     ) -> Result<(), TechniqueError> {
         self.hand_on(self.options.in_flight.max(1) as usize - 1, done)?;
+        self.send(context, &mut |place, _| Ok(place.slot.submit()?))
+    }
+
+    /// Adds a frame to another program's command buffer, and a copy of its picture to its image.
+    pub(crate) fn frame_into(
+        &mut self,
+        context: FrameContext,
+        commands: &gpu::CallersCommands,
+        target: &gpu::Target,
+    ) -> Result<(), TechniqueError> {
+        // A frame that cannot be shown is not begun.
+        self.renderer.device().check_target(target)?;
+        self.send(context, &mut |place, prepared| {
+            Ok(place.slot.execute_in(&prepared.executor, prepared.kept.final_color, commands, target)?)
+        })
+    }
+
+    fn send(&mut self, context: FrameContext, how: &mut Sending<'_>) -> Result<(), TechniqueError> {
         let start = Instant::now();
         let mut events = Vec::new();
         self.show(&context)?;
@@ -213,11 +248,26 @@ impl Flight<'_> {
             self.plan_anew(&context.camera, self.prepared.capacities.again())?;
             events.push(Event::Planned);
         }
-        let place = self.launch()?;
+        let mut place = self.fill_place()?;
+        how(&mut place, &self.prepared)?;
         self.shown = Some(context.clone());
         let flying = Flying { context, cpu: start.elapsed(), events };
         self.places.push_back(Place { flying: Some(flying), ..place });
         Ok(())
+    }
+
+    /// The device is done with the command buffers of all frames up to number `index`; hands these frames to `done`.
+    pub(crate) fn done_by_caller(
+        &mut self,
+        index: u64,
+        done: &mut dyn FnMut(&Done<'_>) -> Result<(), TechniqueError>,
+    ) -> Result<(), TechniqueError> {
+        for place in &mut self.places {
+            if place.flying.as_ref().is_some_and(|flying| flying.context.index <= index) {
+                place.slot.release_from_caller();
+            }
+        }
+        self.hand_on(usize::MAX, done)
     }
 
     /// Waits for all frames on their way and hands them to `done`.
@@ -269,6 +319,13 @@ impl Flight<'_> {
 
     /// Submits a frame of the current view.
     fn launch(&mut self) -> Result<Place, TechniqueError> {
+        let mut place = self.fill_place()?;
+        place.slot.submit()?;
+        Ok(place)
+    }
+
+    /// A place that nobody uses, with the inputs of the current view.
+    fn fill_place(&mut self) -> Result<Place, TechniqueError> {
         // A place whose frame was handed on stands at the front.
         let idle = self.places.iter().position(|place| place.flying.is_none() && place.plan == self.plan);
         let mut place = match idle.and_then(|idle| self.places.remove(idle)) {
@@ -291,14 +348,17 @@ impl Flight<'_> {
             }
         }
         place.pose = Some(self.prepared.viewed.pose);
-        place.slot.submit()?;
         Ok(place)
     }
 
     /// A place of the current plan.
     fn new_place(&self) -> Result<Place, TechniqueError> {
         let inputs: Vec<_> = self.prepared.inputs.iter().map(|input| input.target.clone()).collect();
-        let slot = self.prepared.executor.slot(&inputs, &self.outputs())?;
+        let executor = &self.prepared.executor;
+        let slot = match self.for_callers {
+            true => executor.slot_for_callers(&inputs, &self.outputs())?,
+            false => executor.slot(&inputs, &self.outputs())?,
+        };
         Ok(Place { slot, plan: self.plan, demands: self.demands.clone(), pose: None, flying: None })
     }
 
@@ -378,7 +438,9 @@ impl Flight<'_> {
             drawings_left -= 1;
             flying.events.extend(counters.iter().filter(|one| one.is_scarce()).copied().map(Event::Grown));
             let now = self.shown.clone();
-            let is_drawn_again = fell_short && self.options.shortfall == Shortfall::DrawAgain;
+            // What another program's commands have drawn is in its image: it can only be told.
+            let can_draw_again = self.options.shortfall == Shortfall::DrawAgain && !self.for_callers;
+            let is_drawn_again = fell_short && can_draw_again;
             if is_drawn_again {
                 self.show(&flying.context)?;
             }

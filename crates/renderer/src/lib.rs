@@ -3,11 +3,13 @@
 //! The renderer knows stages, which compose every frame (shadows, indirect light, transparency, filters, the tone map), and no technique: it is
 //! given one as a `&dyn Technique`, which brings its own shaders.
 
+mod embedded;
 mod flight;
 mod prepared;
 mod renderer;
 pub mod supersample;
 
+pub use embedded::Embedded;
 pub use flight::{Done, Event, Flight, FlightOptions, FrameContext, PosedBounds, ScenePose, Shortfall};
 pub use prepared::{Prepared, StoredDepth};
 pub use renderer::Renderer;

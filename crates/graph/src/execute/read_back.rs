@@ -185,6 +185,16 @@ impl ImageCopy {
         self.layer_bytes * self.layouts.len() as u64
     }
 
+    /// Adds a copy of the first layer to another program's commands.
+    pub(super) fn to_target(
+        &self,
+        device: &gpu::Device,
+        commands: &gpu::CallersCommands,
+        target: &gpu::Target,
+    ) -> Result<(), GraphError> {
+        Ok(device.copy_to_target(commands, &self.image, self.layouts[0], target)?)
+    }
+
     /// Records the copy to `offset` bytes in `target`.
     pub(super) fn record(&self, encoder: &mut gpu::Encoder, target: &gpu::Buffer, offset: u64) {
         let image = &self.image;

@@ -132,6 +132,27 @@ impl Executor {
     /// # Errors
     /// An output that [`Executor::read_image`] or [`Executor::read_buffer`] would refuse, no memory, a recording that the device refuses.
     pub fn slot(&self, inputs: &[FrameInput], outputs: &[ResourceId]) -> Result<FrameSlot, GraphError> {
+        self.slot_for(inputs, outputs, false)
+    }
+
+    /// The same for a frame that goes into another program's command buffer ([`FrameSlot::execute_in`]) and is never submitted.
+    ///
+    /// # Errors
+    /// As [`Executor::slot`].
+    pub fn slot_for_callers(
+        &self,
+        inputs: &[FrameInput],
+        outputs: &[ResourceId],
+    ) -> Result<FrameSlot, GraphError> {
+        self.slot_for(inputs, outputs, true)
+    }
+
+    fn slot_for(
+        &self,
+        inputs: &[FrameInput],
+        outputs: &[ResourceId],
+        for_callers: bool,
+    ) -> Result<FrameSlot, GraphError> {
         let mut room = Room::default();
         let inputs: Vec<_> = inputs.iter().map(|input| (input.clone(), room.place(input.bytes()))).collect();
         let written = room.buffer(&self.device, "frame inputs", gpu::MemoryKind::Upload)?;
@@ -147,7 +168,7 @@ impl Executor {
         };
         let outputs = outputs.iter().map(&mut copied).collect::<Result<Vec<_>, GraphError>>()?;
         let read = room.buffer(&self.device, "frame outputs", gpu::MemoryKind::Readback)?;
-        let ends = Ends { written, inputs, read, outputs };
+        let ends = Ends { written, inputs, read, outputs, for_callers };
         let recorded = self.record_between(&ends)?;
         let (completed, times) = (gpu::Completed::default(), FrameTimes::default());
         Ok(FrameSlot { ends, recorded, completed, times })
@@ -164,7 +185,10 @@ impl Executor {
     }
 
     fn record_between(&self, ends: &Ends) -> Result<Recorded, GraphError> {
-        let mut encoder = self.device.encoder_for_many()?;
+        let mut encoder = match ends.for_callers {
+            true => self.device.encoder_for_callers()?,
+            false => self.device.encoder_for_many()?,
+        };
         after_earlier_frames(&mut encoder);
         let start = encoder.timestamp(vk::PipelineStageFlags2::ALL_COMMANDS)?;
         if let Some(written) = &ends.written {
@@ -196,6 +220,8 @@ struct Ends {
     inputs: Vec<(FrameInput, Place)>,
     read: Option<gpu::Buffer>,
     outputs: Vec<(Copied, Place)>,
+    /// Whether another program's command buffer executes the frame.
+    for_callers: bool,
 }
 
 /// A frame's commands, and the times that they take.
@@ -246,6 +272,33 @@ impl FrameSlot {
     /// The device was lost.
     pub fn submit(&mut self) -> Result<(), GraphError> {
         Ok(self.recorded.recording.submit()?)
+    }
+
+    /// Adds the frame to another program's command buffer, and a copy of `picture`, a kept colour image of the executor that the frame is of,
+    /// to its image.
+    ///
+    /// # Errors
+    /// A picture that [`Executor::read_image`] would refuse; a target of a format that it cannot be copied to.
+    ///
+    /// # Panics
+    /// If the frame was not recorded for that, or is with another command buffer.
+    pub fn execute_in(
+        &mut self,
+        executor: &Executor,
+        picture: ResourceId,
+        commands: &gpu::CallersCommands,
+        target: &gpu::Target,
+    ) -> Result<(), GraphError> {
+        assert!(self.ends.for_callers, "a frame that is submitted is added to another program's commands");
+        let copy = executor.image_copy(&picture)?;
+        executor.device.check_target(target)?;
+        executor.device.execute_in(commands, &mut self.recorded.recording);
+        copy.to_target(&executor.device, commands, target)
+    }
+
+    /// The device is done with the command buffer that the frame was added to, or it will never be submitted.
+    pub fn release_from_caller(&mut self) {
+        self.recorded.recording.release_from_caller();
     }
 
     /// Waits for the last submission.
