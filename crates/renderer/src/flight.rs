@@ -10,7 +10,7 @@ use std::{
 };
 
 use afterlight_graph::{FrameSlot, FrameTimes, ResourceId, gpu};
-use afterlight_scene::{Aabb, Camera, Light, Pose, Scene, ShapePose};
+use afterlight_scene::{Aabb, Camera, InstanceHandle, Light, LightHandle, Pose, Scene, ShapePose};
 use glam::Affine3A;
 
 use crate::{Prepared, Renderer, renderer::Recipe};
@@ -95,6 +95,22 @@ impl ScenePose {
             lights: lights_move.then(|| pose.lights.clone()),
             shapes,
         }
+    }
+
+    /// A scene as it was made or loaded, to be changed by handles.
+    pub fn at_rest(scene: &Scene) -> Self {
+        let world_from_objects = scene.instances.iter().map(|instance| instance.world_from_object).collect();
+        Self { world_from_objects, lights: Some(scene.lights.clone()), shapes: None }
+    }
+
+    /// World from object of an instance; `None` where the scene has no such instance.
+    pub fn instance(&mut self, instance: InstanceHandle) -> Option<&mut Affine3A> {
+        self.world_from_objects.get_mut(instance.index())
+    }
+
+    /// A light, whose kind must stay; `None` where the pose has no such light.
+    pub fn light(&mut self, light: LightHandle) -> Option<&mut Light> {
+        self.lights.as_mut()?.get_mut(light.index())
     }
 }
 

@@ -12,6 +12,7 @@ mod error;
 mod gltf;
 pub mod lights;
 mod load;
+mod memory;
 mod model;
 mod mtl;
 mod obj;
@@ -29,5 +30,8 @@ pub use deform::{
 };
 pub use error::SceneError;
 pub use load::{LoadOptions, load, load_bytes, load_source};
+pub use memory::{
+    ImageHandle, InstanceHandle, LightHandle, MaterialHandle, MeshHandle, MeshSource, SceneBuilder,
+};
 pub use model::*;
 pub use pose::{Attachment, Moment, Pose};

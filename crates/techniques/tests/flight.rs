@@ -323,3 +323,54 @@ fn flights_give_back_what_they_held() {
     }
     assert_eq!(held_bytes[1..], [held_bytes[1]; ROUNDS - 1], "{held_bytes:?}");
 }
+
+/// A scene from memory whose instance and light move by their handles shows what one that was made so shows.
+#[test]
+fn handles_move_instances_and_lights() {
+    let gpu = afterlight_testkit::gpu();
+    let make = |at: Vec3, shine: Vec3| {
+        let mut scene = scene::SceneBuilder::new("two triangles");
+        let material = scene.material(scene::Material::default()).expect("a material");
+        let positions_os = [[-0.5, -0.5, 0.0], [0.5, -0.5, 0.0], [0.0, 0.5, 0.0]];
+        let source = scene::MeshSource { positions_os: &positions_os, ..Default::default() };
+        let mesh = scene.mesh("triangle", &source, material).expect("a mesh");
+        scene.instance("still", mesh, Affine3A::IDENTITY).expect("an instance");
+        let instance = scene.instance("moved", mesh, Affine3A::from_translation(at)).expect("an instance");
+        let light = scene.light(Light {
+            kind: scene::LightKind::Directional,
+            position_ws: Vec3::ZERO,
+            direction_ws: shine,
+            intensity: Vec3::splat(3.0),
+            range_m: f32::INFINITY,
+        });
+        scene.camera(Camera::look_at("front", Vec3::Z * 4.0, Vec3::ZERO, 0.7, 0.1));
+        (scene.finish(), instance, light)
+    };
+    let (from, to) = ((Vec3::NEG_X, Vec3::NEG_Z), (Vec3::new(0.8, 0.3, 0.5), Vec3::new(0.0, -0.6, -0.8)));
+    let (scene, instance, light) = make(from.0, from.1);
+    let settings = Settings::for_scene(&scene, SIZE.0, SIZE.1);
+    let renderer = Renderer::new(&gpu, &scene, &settings).expect("a renderer");
+    let mut pose = ScenePose::at_rest(&scene);
+    *pose.instance(instance).expect("its own") = Affine3A::from_translation(to.0);
+    pose.light(light).expect("its own").direction_ws = to.1;
+    let (wanted, ..) = make(to.0, to.1);
+    let wanted_renderer = Renderer::new(&gpu, &wanted, &settings_of(&wanted)).expect("a renderer");
+    for id in ["visibility", "forward"] {
+        let technique = find(id).expect("a technique");
+        let options = FlightOptions { scene_moves: true, ..options() };
+        let mut flight =
+            renderer.fly(technique, &Params::default(), &settings.camera, options).expect("prepared");
+        let camera = settings.camera.clone();
+        let pose = Some(Arc::new(pose.clone()));
+        let (pictures, _) = flown(&mut flight, [FrameContext { index: 0, camera, pose }]);
+        let mut alone = wanted_renderer.prepare(technique, &Params::default()).expect("prepared");
+        alone.run().expect("drawn");
+        let wanted = alone.final_rgba8().expect("read");
+        assert!(wanted.chunks_exact(4).any(|pixel| pixel[0] > 0), "{id}: something shows");
+        assert!(pictures[0].pixels == wanted, "{id}: a pose is not what it says");
+    }
+}
+
+fn settings_of(scene: &scene::Scene) -> Settings {
+    Settings::for_scene(scene, SIZE.0, SIZE.1)
+}

@@ -16,8 +16,8 @@ use super::{accessor::Accessors, check};
 use crate::{Aabb, Material, Mesh, Scene, SceneError, VertexAttributes, tangent};
 
 /// Most vertices of a scene (5 GiB of them) and most indices (4 GiB).
-const VERTEX_COUNT_MAX: u64 = 1 << 27;
-const INDEX_COUNT_MAX: u64 = 1 << 30;
+pub(crate) const VERTEX_COUNT_MAX: u64 = 1 << 27;
+pub(crate) const INDEX_COUNT_MAX: u64 = 1 << 30;
 
 /// Vertices and indices that any file may have, and how many more a byte of its buffers allows. A
 /// small file can name one accessor many times, or one without bytes; real ones stay far below.
@@ -86,7 +86,7 @@ struct Plan<'a> {
 
 /// Packed vertices.
 #[derive(Clone)]
-struct Vertices {
+pub(crate) struct Vertices {
     positions_os: Vec<[f32; 3]>,
     attributes: Vec<VertexAttributes>,
     /// Vertices with a normal of length 0, to be made from the faces.
@@ -139,25 +139,10 @@ pub(super) fn convert(
             (None, Some(shared)) => bases[shared].clone(),
             (None, None) => Placed { range: 0..0, zero_normals: Vec::new() },
         };
-        let Placed { range, zero_normals } = placed;
-        if !zero_normals.is_empty() {
+        if !placed.zero_normals.is_empty() {
             scene.warnings.push(format!("{}: normals of length 0 are made from the faces", job.at));
-            fill_zero_normals(scene, &range, &zero_normals, &indices);
         }
-        let mut bounds_os = Aabb::EMPTY;
-        for &p in &scene.positions_os[range.start as usize..range.end as usize] {
-            bounds_os.extend(p.into());
-        }
-        scene.meshes.push(Mesh {
-            name: job.name.clone(),
-            first_index: scene.indices.len() as u32,
-            index_count: indices.len() as u32,
-            first_vertex: range.start,
-            vertex_count: range.end - range.start,
-            material: job.material,
-            bounds_os,
-        });
-        scene.indices.extend_from_slice(&indices);
+        push_mesh(scene, &job.name, placed, &indices, job.material);
     }
     let mut next = 0;
     Ok(plan
@@ -171,8 +156,37 @@ pub(super) fn convert(
         .collect())
 }
 
+/// Adds a mesh of vertices that are in the scene.
+fn push_mesh(scene: &mut Scene, name: &str, placed: Placed, indices: &[u32], material: u32) {
+    let Placed { range, zero_normals } = placed;
+    fill_zero_normals(scene, &range, &zero_normals, indices);
+    let mut bounds_os = Aabb::EMPTY;
+    for &p in &scene.positions_os[range.start as usize..range.end as usize] {
+        bounds_os.extend(p.into());
+    }
+    scene.meshes.push(Mesh {
+        name: name.to_owned(),
+        first_index: scene.indices.len() as u32,
+        index_count: indices.len() as u32,
+        first_vertex: range.start,
+        vertex_count: range.end - range.start,
+        material,
+        bounds_os,
+    });
+    scene.indices.extend_from_slice(indices);
+}
+
+/// Adds a mesh with its vertices.
+pub(crate) fn add_mesh(scene: &mut Scene, name: &str, vertices: Vertices, indices: &[u32], material: u32) {
+    let placed = append(scene, vertices);
+    push_mesh(scene, name, placed, indices, material);
+}
+
 /// Gives vertices without a normal the mean normal of their faces, weighted by area.
 fn fill_zero_normals(scene: &mut Scene, range: &std::ops::Range<u32>, vertices: &[u32], indices: &[u32]) {
+    if vertices.is_empty() {
+        return;
+    }
     let sums = face_sums(&scene.positions_os[range.start as usize..range.end as usize], indices);
     let attributes = &mut scene.attributes[range.start as usize..range.end as usize];
     for &vertex in vertices {
@@ -344,12 +358,13 @@ fn check_size(accessors: &Accessors, plan: &Plan) -> Result<(), SceneError> {
 }
 
 /// The attributes of a primitive as floats, before packing. Missing ones are empty.
-struct Unpacked {
-    positions_os: Vec<[f32; 3]>,
-    normals_os: Vec<[f32; 3]>,
-    tangents_os: Vec<[f32; 4]>,
-    uv: [Vec<[f32; 2]>; 2],
-    colors: Vec<[f32; 4]>,
+#[derive(Default)]
+pub(crate) struct Unpacked {
+    pub(crate) positions_os: Vec<[f32; 3]>,
+    pub(crate) normals_os: Vec<[f32; 3]>,
+    pub(crate) tangents_os: Vec<[f32; 4]>,
+    pub(crate) uv: [Vec<[f32; 2]>; 2],
+    pub(crate) colors: Vec<[f32; 4]>,
 }
 
 impl Unpacked {
@@ -376,6 +391,34 @@ impl Unpacked {
             uv: [pick(&self.uv[0], source), pick(&self.uv[1], source)],
             colors: pick(&self.colors, source),
         }
+    }
+
+    /// Packs vertices with the normals and tangents that a triangle list needs: faces' own normals where there are none, and tangents along
+    /// the texture coordinates of set `tangents_from`. Vertices whose corners then differ are split; returns the list for them.
+    pub(crate) fn framed(self, mut indices: Vec<u32>, tangents_from: Option<usize>) -> (Vertices, Vec<u32>) {
+        let mut v = self;
+        if v.normals_os.is_empty() {
+            v = v.gather(&indices);
+            for corners in v.positions_os.chunks_exact(3) {
+                let normal = tangent::face_normal([corners[0], corners[1], corners[2]]);
+                v.normals_os.extend([normal.to_array(); 3]);
+            }
+            indices = (0..indices.len() as u32).collect();
+        }
+        if let Some(set) = tangents_from {
+            let surface = tangent::Surface {
+                positions_os: &v.positions_os,
+                normals_os: &v.normals_os,
+                uvs: &v.uv[set],
+                indices: &indices,
+            };
+            let corners = tangent::corner_tangents(&surface);
+            let split = tangent::split_by_tangent(v.positions_os.len(), &indices, &corners);
+            v = v.gather(&split.source);
+            v.tangents_os = split.tangents_os.iter().map(Vec4::to_array).collect();
+            indices = split.indices;
+        }
+        (v.pack(), indices)
     }
 
     fn pack(self) -> Vertices {
@@ -405,33 +448,12 @@ fn build(accessors: &Accessors, job: &Job) -> Result<(Option<Vertices>, Vec<u32>
         return Ok((None, Vec::new(), false));
     }
     let vertex_count = accessors.layout(job.streams.positions)?.count;
-    let (mut indices, leftover) = triangle_list(accessors, job.primitive, vertex_count)?;
+    let (indices, leftover) = triangle_list(accessors, job.primitive, vertex_count)?;
     if job.shared.is_some() {
         return Ok((None, indices, leftover));
     }
-    let mut v = Unpacked::read(accessors, &job.streams)?;
-    if v.normals_os.is_empty() {
-        v = v.gather(&indices);
-        for corners in v.positions_os.chunks_exact(3) {
-            let normal = tangent::face_normal([corners[0], corners[1], corners[2]]);
-            v.normals_os.extend([normal.to_array(); 3]);
-        }
-        indices = (0..indices.len() as u32).collect();
-    }
-    if let Some(set) = job.tangents_from {
-        let surface = tangent::Surface {
-            positions_os: &v.positions_os,
-            normals_os: &v.normals_os,
-            uvs: &v.uv[set],
-            indices: &indices,
-        };
-        let corners = tangent::corner_tangents(&surface);
-        let split = tangent::split_by_tangent(v.positions_os.len(), &indices, &corners);
-        v = v.gather(&split.source);
-        v.tangents_os = split.tangents_os.iter().map(Vec4::to_array).collect();
-        indices = split.indices;
-    }
-    Ok((Some(v.pack()), indices, leftover))
+    let (vertices, indices) = Unpacked::read(accessors, &job.streams)?.framed(indices, job.tangents_from);
+    Ok((Some(vertices), indices, leftover))
 }
 
 /// The primitive's triangles as a list of vertex indices, each checked against the vertices, and

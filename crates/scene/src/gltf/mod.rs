@@ -13,6 +13,8 @@ mod mesh;
 mod motion;
 mod node;
 
+pub(crate) use mesh::{INDEX_COUNT_MAX, Unpacked, VERTEX_COUNT_MAX, add_mesh};
+
 use std::path::Path;
 
 use crate::{LoadOptions, Scene, SceneError};
