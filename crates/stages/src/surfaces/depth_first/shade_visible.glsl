@@ -13,7 +13,10 @@ void main() {
     // A helper stands off its triangle, perhaps where no list holds: it would look for lights in vain (152 ms instead of 488 on
     // lavapipe).
     if (!s.unlit && !gl_HelperInvocation) {
-        radiance += lights_radiance(shading_point(s), uvec2(gl_FragCoord.xy), distance_from_depth(gl_FragCoord.z));
+        // At one sample, where the lists were made for the depth that is stored. At several the surface may be lit nearer than its plane is at
+        // the pixel's centre (center_distance.glsl): the cell there is another's.
+        float distance_m = frame.samples > 1u ? distance_from_position(s.position_ws) : distance_from_depth(gl_FragCoord.z);
+        radiance += lights_radiance(shading_point(s), uvec2(gl_FragCoord.xy), distance_m);
     }
     radiance_out = vec4(radiance, 1.0);
 }
