@@ -109,6 +109,36 @@ fn surfaces_that_end_within_a_pixel_are_lit_alike() {
     }
 }
 
+/// A fragment whose surface ends within its pixel looks for lights in the cell where it is lit. At the pixel's centre its plane is elsewhere, in a
+/// cell with other lights: found by `verify` in Sponza, looking along a wall.
+#[test]
+fn cells_are_those_where_surfaces_are_lit() {
+    let gpu = afterlight_testkit::gpu();
+    let Some(scenes) = afterlight_testkit::shared_scenes() else { return };
+    if afterlight_testkit::sample_counts(&gpu, &[4]).is_empty() {
+        return;
+    }
+    let stage = Stage::new(&gpu, &scenes.join("sponza/sponza.gltf").to_string_lossy());
+    let eye = Vec3::new(10.824047, 5.515173, -9.104732);
+    let target = Vec3::new(39.249557, 14.290485, -9.321085);
+    let camera = Camera::look_at("wall", eye, target, 89.47637f32.to_radians(), 0.002975);
+    let lights = seeded_lights(&stage.scene.bounds_ws(), 3391, 3603696452);
+    let settings = Settings { samples: 4, lights, ..stage.from(camera, (114, 128), 0) };
+    let reference = stage.image(find("forward").unwrap(), &settings);
+    let technique = find("clustered-forward").unwrap();
+    let params = params(technique, &[("cluster-px", "256"), ("slices", "64")]);
+    let db = |shaders: Vec<_>| {
+        psnr(&reference, &image_of(&mut stage.prepare_shaders(technique, &settings, &params, shaders)))
+    };
+    let header = "surfaces/depth_first/shade_visible.glsl";
+    let replaced = [("frame.samples > 1u ? distance_from_position(s.position_ws) :", "")];
+    let mutant = compiled_variant("surfaces/depth_first/by_lights.frag", header, &replaced);
+    let (here, mutant) = (db(Vec::new()), db(vec![mutant]));
+    println!("clustered-forward: {here:.2} dB, {mutant:.2} by the plane's cell");
+    assert!(here >= least_db(technique, &params, 4), "{here:.2} dB");
+    assert!(mutant < 40.0, "{mutant:.2} dB by the plane's cell, a mutant within the bound");
+}
+
 /// Where a device's centroids tell no edge, as Vulkan lets them, fragments that differ within a pixel do: silhouettes, edges between
 /// triangles and intersections.
 #[test]
