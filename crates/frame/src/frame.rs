@@ -283,7 +283,10 @@ pub fn find_shader(shaders: &[&[Shader]], name: &str) -> Result<Shader, Techniqu
 }
 
 /// Checks that one binding of a device that reaches `limit` bytes holds a buffer.
-fn check_range(technique: &str, what: &str, bytes: u64, limit: u64) -> Result<(), TechniqueError> {
+///
+/// # Errors
+/// [`TechniqueError::TooLarge`], which names `what`, the bytes and the limit.
+pub fn check_range(technique: &str, what: &str, bytes: u64, limit: u64) -> Result<(), TechniqueError> {
     if bytes > limit {
         let what = format!("{technique}: bytes of {what}");
         return Err(TechniqueError::TooLarge { what, found: bytes, limit });

@@ -34,7 +34,7 @@ pub use effects::{
     PostEffect, ShadowEffect, Shadows, TessellationEffect, Transparency, TransparencyEffect,
 };
 pub use error::TechniqueError;
-pub use frame::{DrawCommands, Frame, SceneBuffers, find_shader, in_rows};
+pub use frame::{DrawCommands, Frame, SceneBuffers, check_range, find_shader, in_rows};
 pub use inputs::{ChangesWith, View, ViewInput, ViewInputs, ViewScript};
 pub use params::{ParamError, ParamInfo, ParamKind, ParamSet, Params};
 pub use scene::{

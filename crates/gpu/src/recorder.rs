@@ -183,8 +183,8 @@ pub(crate) fn query_pool(
     Ok(pools[place])
 }
 
-/// Puts the results of the first `count` queries into `results`, in order. Returns whether all are there: those of commands that were
-/// never submitted are not.
+/// Puts the results of the first `count` queries into `results`, in order. Returns whether they are there: those of commands that were
+/// never submitted are not, and leave no results.
 pub(crate) fn query_results<T: bytemuck::Pod>(
     device: &ash::Device,
     pools: &[vk::QueryPool],
@@ -196,7 +196,10 @@ pub(crate) fn query_results<T: bytemuck::Pod>(
     for (part, &pool) in results.chunks_mut(QUERIES_PER_POOL as usize).zip(pools) {
         // SAFETY: all of these queries were used in a submission that is done; `T` is as many u64 as a query gives.
         match unsafe { device.get_query_pool_results(pool, 0, part, vk::QueryResultFlags::TYPE_64) } {
-            Err(vk::Result::NOT_READY) => return Ok(false),
+            Err(vk::Result::NOT_READY) => {
+                results.clear();
+                return Ok(false);
+            }
             result => result.map_err(lost("vkGetQueryPoolResults", "all"))?,
         }
     }

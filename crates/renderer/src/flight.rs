@@ -69,7 +69,7 @@ pub struct ScenePose {
     pub world_from_objects: Vec<Affine3A>,
     /// The lights, as many and of the same kinds as the renderer's; `None` is those.
     pub lights: Option<Vec<Light>>,
-    /// Shapes of skinned and morphed meshes; `None` is those of the pose before, at first those that were uploaded.
+    /// Shapes of skinned and morphed meshes; `None` is those that were uploaded.
     pub shapes: Option<PosedBounds>,
 }
 

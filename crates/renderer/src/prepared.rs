@@ -115,7 +115,13 @@ impl Viewed {
                 placed.shapes.set(&shapes.pose);
                 &shapes.bounds_os[..]
             }
-            None => &[],
+            None => match &self.scene.deformed {
+                Some(deformed) => {
+                    placed.shapes.clone_from(&self.scene.rest.shapes);
+                    &deformed.rest_bounds_os[..]
+                }
+                None => &[],
+            },
         };
         let moved = placed.place(&self.scene.draw_sources, &pose.world_from_objects, deformed);
         moved.map_err(|TurnedOver { instance }| TechniqueError::TurnedOver { instance })

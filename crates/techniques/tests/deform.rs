@@ -237,6 +237,12 @@ fn frames_that_play_are_pictures_of_their_poses() {
                 let name = file.display();
                 assert!(db >= UNORDERED_DB, "{name}, {id}: frame {number} is {db:.1} dB off its pose");
             }
+            // Without shapes of its own a pose has those that were uploaded, whatever was shown before.
+            let at_rest = ScenePose { lights: None, ..ScenePose::at_rest(scene) };
+            let last = flown(&stage, id, &settings, &[of_scene[3].clone(), Arc::new(at_rest)]).pop();
+            let alone = image_of(&mut stage.prepare(technique, &settings));
+            let db = psnr(&alone, &last.expect("two frames"));
+            assert!(db >= UNORDERED_DB, "{}, {id}: at rest again {db:.1} dB off", file.display());
             moved += usize::from(pictures.windows(2).any(|pair| pair[0].pixels != pair[1].pixels));
         }
     }

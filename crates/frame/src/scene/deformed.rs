@@ -1,7 +1,7 @@
 //! What skins and morph targets deform, on the device: shapes as the file has them, from which a pass writes the drawn vertices of each pose.
 
 use afterlight_graph::gpu;
-use afterlight_scene::{Scene, Shape, ShapePose};
+use afterlight_scene::{Aabb, Scene, Shape, ShapePose};
 use afterlight_shader::structs::{DeformGroup, Deformed};
 use glam::Affine3A;
 
@@ -33,6 +33,8 @@ pub struct DeformedGpu {
     pub joint_count: u32,
     /// Weights of targets in a pose.
     pub weight_count: u32,
+    /// A box of each deformed instance in the pose that was uploaded ([`Scene::deformed_bounds_os`]).
+    pub rest_bounds_os: Vec<(u32, Aabb)>,
 }
 
 /// Joints and weights of a pose as the device has them.
@@ -75,7 +77,7 @@ struct Lists {
 }
 
 impl DeformedGpu {
-    /// Uploads the shapes of a scene; `None` where nothing deforms.
+    /// Uploads the shapes of a scene, whose deformed instances have these boxes; `None` where nothing deforms.
     ///
     /// # Errors
     /// The device.
@@ -83,6 +85,7 @@ impl DeformedGpu {
         device: &gpu::Device,
         uploader: &mut gpu::Uploader,
         scene: &Scene,
+        rest_bounds_os: Vec<(u32, Aabb)>,
     ) -> Result<Option<Self>, gpu::GpuError> {
         if scene.deformations.is_empty() {
             return Ok(None);
@@ -90,6 +93,7 @@ impl DeformedGpu {
         let lists = Lists::of(scene);
         let mut upload = |name: &str, words: &[u32]| upload_slice(device, uploader, name, words);
         Ok(Some(Self {
+            rest_bounds_os,
             group_count: lists.groups.len() as u32,
             joint_count: scene.shaped.object_from_bind.len() as u32,
             weight_count: scene.shaped.weights.len() as u32,

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use afterlight_scene::{Aabb, AlphaMode, Material, Scene, TextureRef};
 use afterlight_shader::structs::{DRAW_MIRRORED, DrawData, TRIANGLE_BITS};
 
-use super::placed::{DrawSource, object_rows, world_from_object};
+use super::placed::{DrawSource, object_rows};
 use crate::TechniqueError;
 
 /// Most triangles of one draw. A triangle ID keeps the triangle's number within its draw in `TRIANGLE_BITS` bits, and
@@ -94,20 +94,6 @@ pub(super) struct DrawTable {
 }
 
 impl DrawTable {
-    /// Gives draws of deformed instances the boxes that hold all of their shapes: in object space, by rising number of the instance.
-    pub(super) fn bound_deformed(&mut self, deformed: &[(u32, Aabb)]) {
-        if deformed.is_empty() {
-            return;
-        }
-        let infos = self.infos.iter_mut().chain(&mut self.blended);
-        for ((info, source), record) in infos.zip(&mut self.sources).zip(&self.data) {
-            let found = deformed.binary_search_by_key(&source.instance, |(instance, _)| *instance);
-            let Ok(at) = found else { continue };
-            source.bounds_os = deformed[at].1;
-            info.bounds_ws = source.bounds_os.transformed(&world_from_object(record));
-        }
-    }
-
     pub(super) fn new(scene: &Scene, pieces: &[Vec<Aabb>]) -> Result<Self, TechniqueError> {
         let mut by_bucket: [Vec<Draw>; BUCKETS] = Default::default();
         let mut blended: Vec<Draw> = Vec::new();

@@ -92,9 +92,13 @@ impl SceneGpu {
     ) -> Result<Arc<Self>, TechniqueError> {
         let mut uploader = device.uploader()?;
         let mut warnings = Vec::new();
-        let (indices, pieces) = compact_pieces(scene);
-        let mut draws = DrawTable::new(scene, &pieces)?;
-        draws.bound_deformed(&scene.deformed_bounds_os(&scene.shaped));
+        let (indices, mut pieces) = compact_pieces(scene);
+        // Pieces of a deformed mesh are bounded by what holds all of its shape, as in every other pose.
+        let rest_bounds_os = scene.deformed_bounds_os(&scene.shaped);
+        for (instance, bounds_os) in &rest_bounds_os {
+            pieces[scene.instances[*instance as usize].mesh as usize].fill(*bounds_os);
+        }
+        let draws = DrawTable::new(scene, &pieces)?;
         let blended =
             Blended::new(scene, &indices, &draws.data[draws.infos.len()..], draws.blended, draws.infos.len());
         let table = TextureTable::plan(scene, device.features(), &mut warnings)?;
@@ -108,7 +112,7 @@ impl SceneGpu {
         let draw_data = record_image(device, &mut uploader, "scene draw records", &draws.data, 4, uint4)?;
         let materials = record_image(device, &mut uploader, "scene materials", &materials, 8, uint4)?;
         let uv_transforms = upload_slice(device, &mut uploader, "scene texture transforms", &transforms)?;
-        let deformed = DeformedGpu::upload(device, &mut uploader, scene)?;
+        let deformed = DeformedGpu::upload(device, &mut uploader, scene, rest_bounds_os)?;
         let textures = table.upload(device, &mut uploader, &scene.images, progress)?;
         uploader.finish()?;
 

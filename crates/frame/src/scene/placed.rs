@@ -107,10 +107,3 @@ pub(super) fn object_rows(m: &Affine3A) -> [[f32; 4]; 3] {
         [row.x, row.y, row.z, m.translation[i]]
     })
 }
-
-/// The matrix that a draw's record has the rows of.
-pub(super) fn world_from_object(record: &DrawData) -> Affine3A {
-    let [x, y, z] = [record.object_row0, record.object_row1, record.object_row2].map(glam::Vec4::from);
-    let rows = glam::Mat3A::from_cols(x.truncate().into(), y.truncate().into(), z.truncate().into());
-    Affine3A { matrix3: rows.transpose(), translation: glam::Vec3A::new(x.w, y.w, z.w) }
-}

@@ -1,7 +1,7 @@
 //! The stage that writes the vertices of skinned and morphed meshes in the pose of each frame, before anything reads them.
 
 use afterlight_frame::{
-    ChangesWith, SceneGpu, TechniqueError, ViewInputs, find_shader, in_rows, put,
+    ChangesWith, SceneGpu, TechniqueError, ViewInputs, check_range, find_shader, in_rows, put,
     scene::deformed::{DeformedGpu, PosedShapes},
 };
 use afterlight_graph::{
@@ -26,7 +26,7 @@ pub struct Given<'a> {
 /// are after it. It writes them in their place, in every frame that is run: frames of one scene run one after another.
 ///
 /// # Errors
-/// A shader that is not compiled in, the device.
+/// Shapes that one binding does not reach: [`TechniqueError::TooLarge`]. A shader that is not compiled in, the device.
 pub fn record(
     graph: &mut Graph,
     given: &Given<'_>,
@@ -46,6 +46,10 @@ pub fn record(
         ("Joints", joints),
         ("Weights", weights),
     ];
+    // Numbers of vertices and differences are of 32 bits: what one binding reaches is less.
+    for (slot, buffer) in &read {
+        check_range("shared/deform", slot, buffer.bytes(), given.device.features().max_storage_buffer_range)?;
+    }
     let shader = find_shader(given.shaders, "shared/deform/deform.comp")?;
     let mut pass = graph.compute("shared/deform", PassRole::Shared, &shader);
     pass.push(&[deformed.group_count]);

@@ -26,6 +26,7 @@ void main() {
     float depth = depth_from_position(position_ws);
     float depth_change = abs(dFdx(depth)) + abs(dFdy(depth));
     Surface s = visible_surface();
+    // Where the surface is lit, which is the plane's place but at its horizon.
     depth = depth_from_position(s.position_ws);
     base_color_metallic = vec4(s.base_color, s.metallic);
     normal_oct = octahedral_encode(s.normal_ws) * 0.5 + 0.5;
