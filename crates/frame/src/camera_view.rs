@@ -1,11 +1,17 @@
 //! A camera's matrices for an image size, and what of the scene they bound.
 
+use std::ops::Range;
+
 use afterlight_graph::{Rect, gpu::vk};
 use afterlight_scene::{Aabb, Camera, Projection};
 use afterlight_shader::structs::FrameConstants;
 use glam::{Mat4, Vec3, Vec4};
 
-use crate::{SceneLights, Settings, scene::placed::Placed, views};
+use crate::{
+    SceneLights, Settings,
+    scene::{draw_list::QueryView, placed::Placed},
+    views,
+};
 
 /// A camera's matrices for an image size.
 pub struct CameraView {
@@ -49,6 +55,30 @@ impl CameraView {
     /// What the view distance of a point p, m, is: dot(xyz, p) + w. The view looks along -z.
     pub fn distance_from_world(&self) -> Vec4 {
         -self.view_from_world.row(2)
+    }
+
+    /// What draws are chosen for: this view, of draws within `bounds_ws`.
+    pub fn query(&self, rows: Option<Range<u32>>, bounds_ws: Aabb, displacement_m: f32) -> QueryView {
+        QueryView {
+            clip_from_world: self.clip_from_world,
+            eye_ws: self.eye_ws,
+            height_px: self.size_px[1],
+            size_on_image: self.size_on_image(),
+            rows,
+            bounds_ws,
+            displacement_m,
+        }
+    }
+
+    /// How large things are on the image: what they are divided by at a point p, dot(xyz, p) + w, and the pixels that 1 m is high where that is 1.
+    fn size_on_image(&self) -> (Vec4, f32) {
+        let half_px = 0.5 * self.size_px[1] as f32;
+        match self.projection {
+            Projection::Perspective { fov_y_rad, .. } => {
+                (self.distance_from_world(), half_px / (0.5 * fov_y_rad).tan())
+            }
+            Projection::Orthographic { half_height_m, .. } => (Vec4::W, half_px / half_height_m),
+        }
     }
 
     /// What `include/frame.glsl` declares, for this view of surfaces within `bounds_ws`, in the surroundings of the settings.

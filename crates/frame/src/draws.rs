@@ -1,14 +1,24 @@
-//! What every technique can be asked for: which draws, in what order.
+//! What every technique can be asked for: which draws, in what order, and who chooses them.
 
 use afterlight_params::{choices, parameters};
 
 choices! {
-    /// Which draws are left out on the CPU.
+    /// Which draws are left out.
     pub enum Cull {
         /// Those outside the view.
         Frustum = "frustum",
         /// None.
         None = "none",
+    }
+}
+
+choices! {
+    /// Who chooses draws and puts them in order. Both come to the same, bit by bit.
+    pub enum CullOn {
+        /// The device, by two dispatches before the first pass: the host's time does not grow with the number of draws.
+        Gpu = "gpu",
+        /// The host, which writes indirect commands for each view.
+        Cpu = "cpu",
     }
 }
 
@@ -30,8 +40,12 @@ parameters! {
     /// Parameters that every technique has.
     #[derive(Copy)]
     pub struct DrawParams {
-        /// draws outside the view are left out on the CPU
+        /// draws outside the view are left out
         cull: Cull = Cull::Frustum, "cull";
+        /// who chooses and orders draws, the device or the host; the picture is the same
+        cull_on: CullOn = CullOn::Gpu, "cull-on";
+        /// draws whose bounds are smaller than so many pixels across are left out, which changes the picture; 0 leaves out none
+        cull_px: f32 = 0.0, "cull-px", 0.0..=64.0;
         /// order of draws: by the nearest point or the centre of their bounds, or as in the scene
         order: DrawOrder = DrawOrder::Center, "order";
     }

@@ -1,7 +1,5 @@
 //! What a technique is given to record a frame.
 
-use std::{borrow::Cow, ops::Range};
-
 use afterlight_graph::{
     BufferHandle, BufferRole, Graph, ImageHandle, ImageInfo, PassRole,
     gpu::{self, vk},
@@ -9,13 +7,9 @@ use afterlight_graph::{
 use afterlight_shader::Shader;
 
 use crate::{
-    Board, ChangesWith, Params, Slots, TechniqueError, ViewInputs,
+    Board, Params, Slots, TechniqueError, ViewInputs,
     capacity::Capacities,
-    scene::{
-        BUCKETS, SceneGpu,
-        draw_list::{Rows, displaced},
-        lights::SceneLights,
-    },
+    scene::{BUCKETS, SceneGpu, lights::SceneLights},
     set_constants, views,
 };
 
@@ -54,8 +48,6 @@ pub struct Frame<'a> {
     pub device: &'a gpu::Device,
     /// Capacities that earlier frames of the same view asked for.
     pub capacities: &'a Capacities,
-    /// Draws that the eye has in view, by bucket, in drawing order. Who uses it while recording says so ([`Frame::holds_for_this_view`]).
-    pub visible: &'a [Vec<u32>; BUCKETS],
     /// What is written anew for each view.
     pub inputs: &'a ViewInputs,
     /// Whether the frame will be run from other views too: what some view needs is recorded, be it empty in this one.
@@ -74,6 +66,8 @@ pub struct SceneBuffers {
     pub draws: BufferHandle,
     /// The same, four texels a draw.
     pub draw_data: ImageHandle,
+    /// A `DrawBounds` a draw, two texels.
+    pub draw_bounds: ImageHandle,
     /// Materials, eight texels each.
     pub materials: ImageHandle,
     /// Rows of texture transforms.
@@ -160,30 +154,6 @@ impl Frame<'_> {
     /// ([`coarse_depth_warning`](crate::camera_view::coarse_depth_warning)).
     pub fn depth_stencil_format(&self) -> vk::Format {
         self.device.depth_stencil_format()
-    }
-
-    /// Brings the commands of the draws in view that may reach some rows of the image into the graph, in drawing order. The rows
-    /// alone cull: what the view does not cull stays in some rows at least.
-    ///
-    /// # Errors
-    /// The device.
-    pub fn draws_in_rows(
-        &self,
-        graph: &mut Graph,
-        name: &str,
-        rows: Range<u32>,
-    ) -> Result<DrawCommands, TechniqueError> {
-        self.inputs.declare_draws(self.device, graph, (name, ChangesWith::Camera), self.scene, move |view| {
-            let settings = view.settings;
-            let rows = Rows::new(view.camera.clip_from_world, rows.clone(), settings.height_px);
-            let displacement_m = view.displacement_m();
-            Cow::Owned(view.visible.each_ref().map(|visible| {
-                let infos = visible.iter().filter(|draw| {
-                    rows.touch(&displaced(&view.placed.infos[**draw as usize].bounds_ws, displacement_m))
-                });
-                infos.copied().collect::<Vec<u32>>()
-            }))
-        })
     }
 
     /// Checks that one binding holds a buffer.

@@ -3,6 +3,8 @@
 use std::{
     borrow::Cow,
     cell::{Cell, RefCell},
+    ops::Range,
+    sync::OnceLock,
 };
 
 use afterlight_graph::{
@@ -13,10 +15,10 @@ use afterlight_graph::{
 use afterlight_scene::Aabb;
 
 use crate::{
-    CameraView, DrawCommands, Frame, SceneGpu, SceneLights, Settings, TechniqueError,
+    CameraView, DrawCommands, DrawParams, Frame, SceneGpu, SceneLights, Settings, TechniqueError,
     scene::{
         BUCKETS,
-        draw_list::{COMMAND_BYTES, write_commands, write_counts},
+        draw_list::{COMMAND_BYTES, DrawQuery, DrawsInOrder, write_commands, write_counts},
         placed::Placed,
     },
     upload::put,
@@ -32,13 +34,50 @@ pub struct View<'a> {
     pub scene: &'a SceneGpu,
     /// The lights.
     pub lights: &'a SceneLights,
-    /// Draws in view, by bucket, in drawing order.
-    pub visible: &'a [Vec<u32>; BUCKETS],
+    /// How the eye chooses draws.
+    pub choice: &'a ViewChoice,
     /// Where surfaces stand.
     pub placed: &'a Placed,
 }
 
+/// How the draws of a view are chosen, and what the host has chosen so far: nothing unless something asks for it.
+#[derive(Debug, Default)]
+pub struct ViewChoice {
+    /// How draws are chosen and ordered.
+    pub options: DrawParams,
+    draws: OnceLock<DrawsInOrder>,
+}
+
+impl ViewChoice {
+    /// Draws that are to be chosen in this way.
+    pub fn new(options: DrawParams) -> Self {
+        Self { options, draws: OnceLock::new() }
+    }
+
+    /// Forgets what was chosen: the view has changed.
+    pub fn begin_view(&mut self) {
+        self.draws.take();
+    }
+}
+
 impl View<'_> {
+    /// Draws that the eye has in view, by bucket, in drawing order. The host finds them when a view asks for the first time, which takes time
+    /// by the number of draws.
+    pub fn visible(&self) -> &DrawsInOrder {
+        let choose = || self.query(None).choose(&self.scene.bucket_first, &self.placed.infos);
+        self.choice.draws.get_or_init(choose)
+    }
+
+    /// What decides which draws the eye needs, of which only those that may reach some rows of the image where there are any.
+    pub fn query(&self, rows: Option<Range<u32>>) -> DrawQuery {
+        self.query_of(&self.choice.options, self.camera, rows)
+    }
+
+    /// The same of another camera.
+    pub fn query_of(&self, options: &DrawParams, camera: &CameraView, rows: Option<Range<u32>>) -> DrawQuery {
+        DrawQuery::new(options, &camera.query(rows, self.bounds_ws(), self.displacement_m()))
+    }
+
     /// How far displacement moves surfaces along each axis at most, m.
     pub fn displacement_m(&self) -> f32 {
         self.settings.effects.tessellation.displacement_m()
@@ -204,7 +243,8 @@ impl ViewInputs {
         Ok(handle)
     }
 
-    /// Brings the commands of the draws that `of_view` chooses into the graph, named after `name`: a range a bucket, with room for all.
+    /// Brings the commands of the draws that `of_view` chooses on the host into the graph, named after `name`: a range a bucket, with room for
+    /// all.
     ///
     /// # Errors
     /// The device.
@@ -214,7 +254,7 @@ impl ViewInputs {
         graph: &mut Graph,
         (name, changes_with): (&str, ChangesWith),
         scene: &SceneGpu,
-        of_view: impl for<'v> Fn(&'v View<'_>) -> Cow<'v, [Vec<u32>; BUCKETS]> + Clone + Send + Sync + 'static,
+        of_view: impl for<'v> Fn(&'v View<'_>) -> Cow<'v, DrawsInOrder> + Clone + Send + Sync + 'static,
     ) -> Result<DrawCommands, TechniqueError> {
         let usage = vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::INDIRECT_BUFFER;
         let bytes = COMMAND_BYTES * scene.draw_count().max(1) as u64;

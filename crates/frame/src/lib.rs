@@ -28,14 +28,14 @@ pub mod views;
 pub use board::{Board, OpaqueDepth, SceneInput, SurfaceNormals, TriangleIds, VisitsAllLights};
 pub use camera_view::CameraView;
 pub use capacity::Counter;
-pub use draws::{Cull, DrawOrder, DrawParams};
+pub use draws::{Cull, CullOn, DrawOrder, DrawParams};
 pub use effects::{
     Effects, Indirect, IndirectEffect, MAX_DISPLACEMENT_MM, MAX_TESSELLATE_PX, MIN_TESSELLATE_PX, Post,
     PostEffect, ShadowEffect, Shadows, TessellationEffect, Transparency, TransparencyEffect,
 };
 pub use error::TechniqueError;
 pub use frame::{DrawCommands, Frame, SceneBuffers, check_range, find_shader, in_rows};
-pub use inputs::{ChangesWith, View, ViewInput, ViewInputs, ViewScript};
+pub use inputs::{ChangesWith, View, ViewChoice, ViewInput, ViewInputs, ViewScript};
 pub use params::{ParamError, ParamInfo, ParamKind, ParamSet, Params};
 pub use scene::{
     SceneGpu,

@@ -7,12 +7,11 @@ use afterlight_graph::{Executor, FrameInput, FrameReport, ResourceId, gpu};
 use afterlight_scene::{Camera, Light, ShapePose};
 
 use afterlight_frame::{
-    CameraView, DrawParams, LightPairs, SceneLights, Settings, TechniqueError, View, ViewInput, ViewInputs,
-    ViewScript,
+    CameraView, DrawParams, LightPairs, SceneLights, Settings, TechniqueError, View, ViewChoice, ViewInput,
+    ViewInputs, ViewScript,
     capacity::{Capacities, Counter, Demand},
     scene::{
         SceneGpu,
-        draw_list::DrawChoice,
         placed::{Placed, TurnedOver},
     },
     views,
@@ -51,7 +50,7 @@ pub(crate) struct Viewed {
     pub scene: Arc<SceneGpu>,
     lights: Arc<SceneLights>,
     pub camera: CameraView,
-    pub draws: DrawChoice,
+    pub choice: ViewChoice,
     pub moved: Moved,
     /// Counts the poses so far.
     pub pose: u64,
@@ -67,17 +66,15 @@ impl Viewed {
         options: DrawParams,
     ) -> Self {
         let camera = CameraView::fitted(settings, moved.placed.as_deref().unwrap_or(&scene.rest));
-        let draws = DrawChoice::new(options);
-        let mut viewed = Self { settings: settings.clone(), camera, draws, moved, pose: 0, scene, lights };
-        viewed.choose_draws();
-        viewed
+        let choice = ViewChoice::new(options);
+        Self { settings: settings.clone(), camera, choice, moved, pose: 0, scene, lights }
     }
 
     /// Looks through another camera.
     pub fn look_through(&mut self, camera: &Camera) {
         self.settings.camera.clone_from(camera);
         self.camera = CameraView::fitted(&self.settings, self.placed());
-        self.choose_draws();
+        self.choice.begin_view();
     }
 
     /// Where surfaces stand.
@@ -127,20 +124,13 @@ impl Viewed {
         moved.map_err(|TurnedOver { instance }| TechniqueError::TurnedOver { instance })
     }
 
-    fn choose_draws(&mut self) {
-        let placed = self.moved.placed.as_deref().unwrap_or(&self.scene.rest);
-        let displacement_m = self.settings.effects.tessellation.displacement_m();
-        let from = (self.camera.clip_from_world, self.camera.eye_ws);
-        self.draws.update(&self.scene, &placed.infos, from, displacement_m);
-    }
-
     pub fn view(&self) -> View<'_> {
         View {
             camera: &self.camera,
             settings: &self.settings,
             scene: &self.scene,
             lights: self.moved.lights.as_deref().unwrap_or(&self.lights),
-            visible: &self.draws.visible,
+            choice: &self.choice,
             placed: self.placed(),
         }
     }

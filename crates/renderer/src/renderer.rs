@@ -1,6 +1,6 @@
 //! From a scene and a technique to an image.
 
-use std::{borrow::Cow, sync::Arc};
+use std::sync::Arc;
 
 use afterlight_graph::{
     BufferRole, Executor, Graph, ImageHandle, ResourceId,
@@ -11,13 +11,13 @@ use afterlight_shader::{Shader, structs::FrameConstants};
 
 use crate::prepared::{Kept, Moved, Prepared, Viewed};
 use afterlight_frame::{
-    Board, CameraView, ChangesWith, Cull, DrawParams, Frame, MAX_DISPLACEMENT_MM, MIN_TESSELLATE_PX,
+    Board, CameraView, ChangesWith, Cull, CullOn, DrawParams, Frame, MAX_DISPLACEMENT_MM, MIN_TESSELLATE_PX,
     OpaqueDepth, Params, SceneBuffers, SceneLights, Settings, Technique, TechniqueError, TessellationEffect,
     ViewInputs,
     camera_view::{background_radiance, coarse_depth_warning},
     capacity::{self, Capacities},
     completed, put,
-    scene::SceneGpu,
+    scene::{SceneGpu, draw_list},
     upload::upload_slice,
     views,
 };
@@ -27,7 +27,7 @@ use afterlight_stages::{
         transparent::{self, BlendedList},
     },
     lights::volumes,
-    shared::{deform, indirect, shadow},
+    shared::{cull::SceneOfDraws, deform, indirect, shadow},
     views::{light_pair_colors, of as technique_views},
 };
 
@@ -303,11 +303,10 @@ impl Renderer {
             view: &settings.view,
             tessellate_px: settings.effects.tessellation.edge_px,
             displacement_m: settings.effects.tessellation.displacement_m(),
-            buffers: self.import(&mut graph, &inputs, shaders, scene_moves)?,
+            buffers: self.import(&mut graph, &inputs, (shaders, options.cull_on), scene_moves)?,
             shaders,
             device: &self.device,
             capacities: &capacities,
-            visible: view.visible,
             inputs: &inputs,
             moves,
             scene_moves,
@@ -339,7 +338,8 @@ impl Renderer {
             light_pairs: hdr_id.filter(|_| counts_pairs),
             final_color,
         };
-        let draw_calls = viewed.draws.count() + blended.as_ref().map_or(0, |list| list.draw_count);
+        let draw_calls =
+            draw_list::count(view.visible()) + blended.as_ref().map_or(0, |list| list.draw_count);
         Prepared::new(&self.device, executor, viewed, inputs, capacities, kept, draw_calls)
     }
 
@@ -348,7 +348,7 @@ impl Renderer {
         &self,
         graph: &mut Graph,
         inputs: &ViewInputs,
-        shaders: &[&[Shader]],
+        (shaders, cull_on): (&[&[Shader]], CullOn),
         alive: bool,
     ) -> Result<SceneBuffers, TechniqueError> {
         let s = &self.scene;
@@ -362,9 +362,6 @@ impl Renderer {
                 put(bytes, 0, &[view.camera.constants(view.settings, view.lights, &bounds_ws)]);
             },
         )?;
-        let draws = inputs.declare_draws(&self.device, graph, ("draw", ChangesWith::Camera), s, |view| {
-            Cow::Borrowed(view.visible)
-        })?;
         let (stream, records) = match alive {
             true => inputs.declare_records(&self.device, graph, s)?,
             false => (
@@ -385,10 +382,22 @@ impl Renderer {
         );
         let given = deform::Given { device: &self.device, inputs, scene: s, shaders };
         let (positions, attributes) = deform::record(graph, &given, positions, attributes)?;
+        let bounds = graph.import_image("scene draw bounds", BufferRole::Scene, &s.draw_bounds, UPLOADED);
+        let scene = SceneOfDraws {
+            device: &self.device,
+            inputs,
+            shaders,
+            scene: s,
+            draw_data: &records,
+            draw_bounds: &bounds,
+            cull_on,
+        };
+        let draws = scene.in_view(graph)?;
         Ok(SceneBuffers {
             frame: constants,
             draws: stream,
             draw_data: records,
+            draw_bounds: bounds,
             materials: graph.import_image("scene materials", BufferRole::Scene, &s.materials, UPLOADED),
             uv_transforms: graph.import_buffer(
                 "scene texture transforms",

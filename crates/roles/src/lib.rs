@@ -76,6 +76,7 @@ mod tests {
                 "shading",
                 "resolve",
                 "shared",
+                "culling",
                 "transparency",
                 "filter",
                 "present",
@@ -112,7 +113,7 @@ mod tests {
     #[test]
     fn what_techniques_share_is_told_apart() {
         let shared: Vec<_> = PassRole::ALL.iter().filter(|role| role.is_shared()).collect();
-        assert_eq!(shared, [&PassRole::Shared, &PassRole::Transparency]);
+        assert_eq!(shared, [&PassRole::Shared, &PassRole::Culling, &PassRole::Transparency]);
         let shared: Vec<_> = BufferRole::ALL.iter().filter(|role| role.is_shared()).collect();
         assert_eq!(shared, [&BufferRole::Shared, &BufferRole::Transparency]);
     }

@@ -23,6 +23,8 @@ roles! {
         Resolve => "resolve",
         /// Work that several techniques share, reported apart: shadow map, reflective shadow map.
         Shared => "shared",
+        /// Chooses the draws that a view needs and puts them in order, whatever the technique.
+        Culling => "culling",
         /// Draws blended surfaces over the opaque image; techniques share it as well.
         Transparency => "transparency",
         /// Anti-aliasing after shading (FXAA, SMAA, SRAA).
@@ -37,7 +39,7 @@ roles! {
 impl PassRole {
     /// Returns whether it is work that techniques share, which a technique's own time leaves out.
     pub const fn is_shared(self) -> bool {
-        matches!(self, Self::Shared | Self::Transparency)
+        matches!(self, Self::Shared | Self::Culling | Self::Transparency)
     }
 }
 

@@ -51,6 +51,36 @@ shader_struct! {
         pub size_px: u32,
     }
 
+    /// Which draws a view needs, in which order (`shared/cull/choice.glsl` of the stages).
+    pub struct DrawChoiceConstants {
+        /// Half-spaces that a draw must reach: inside where dot(xyz, p) + w is not negative. Those that are not used hold every point.
+        pub planes: [[f32; 4]; 8],
+        /// View distance in metres of a world point p, by which its size on the image is: dot(xyz, p) + w.
+        pub distance_from_world: [f32; 4],
+        /// What distances are measured from.
+        pub eye_ws: [f32; 3],
+        /// How far surfaces may be displaced along each axis, m.
+        pub displacement_m: f32,
+        /// Draws whose diagonal over their least view distance is less are left out; 0 leaves out none.
+        pub least_ratio: f32,
+        /// What orders draws: `ORDER_…`.
+        pub order: u32,
+        /// Step of the farthest distance of the scene: draws at that distance are in the last bin.
+        pub farthest_step: u32,
+    }
+
+    /// What of a draw its choice needs beside its record; two texels (`shared/cull/choice.glsl` of the stages).
+    pub struct DrawBounds {
+        /// Least corner, object space.
+        pub min_os: [f32; 3],
+        /// Indices, three a triangle.
+        pub index_count: u32,
+        /// Greatest corner, object space.
+        pub max_os: [f32; 3],
+        /// Not used: a texel is as long.
+        pub unused: u32,
+    }
+
     /// One draw: at most 1,024 triangles of one instance; four texels, and the vertex stream of instances
     /// (`include/scene.glsl`).
     pub struct DrawData {
@@ -164,6 +194,8 @@ pub const LAYOUTS: &[crate::StructLayout] = &[
     FrameConstants::LAYOUT,
     RsmConstants::LAYOUT,
     ShadowConstants::LAYOUT,
+    DrawChoiceConstants::LAYOUT,
+    DrawBounds::LAYOUT,
     DrawData::LAYOUT,
     DeformGroup::LAYOUT,
     Deformed::LAYOUT,
@@ -171,6 +203,12 @@ pub const LAYOUTS: &[crate::StructLayout] = &[
     LightData::LAYOUT,
 ];
 
+/// `DrawChoiceConstants::order`: as in the scene.
+pub const ORDER_SCENE: u32 = 0;
+/// `DrawChoiceConstants::order`: by the distance of the centre of their bounds.
+pub const ORDER_CENTER: u32 = 1;
+/// `DrawChoiceConstants::order`: by the distance of the nearest point of their bounds.
+pub const ORDER_NEAR: u32 = 2;
 /// `DrawData::flags`: negative determinant.
 pub const DRAW_MIRRORED: u32 = 1;
 /// `MaterialData::flags`: base colour is what leaves.

@@ -172,14 +172,14 @@ pub static TABLE: Table = Table {
         Folders {
             crate_folder: "crates/stages",
             rule: Rule::Layers(&[
-                &["shared/sort"],
+                &["shared/sort", "shared/cull"],
                 &["lights"],
                 &["surfaces"],
                 &["views"],
                 &["shared"],
                 &["compose"],
             ]),
-            reason: "a sort knows keys alone; lights are listed for places, whatever stands there; surfaces are shaded by the lights; views show both; \
+            reason: "a sort knows keys alone, a choice of draws their bounds; lights are listed for places, whatever stands there; surfaces are shaded by the lights; views show both; \
                      shared work draws surfaces; what a frame ends in comes last",
         },
         Folders { crate_folder: "crates/renderer", rule: Rule::Layers(&[]), reason: "no circles" },

@@ -114,6 +114,7 @@ fn touched_in_full(role: PassRole, work: PassWork, tests_depth: bool) -> Option<
         PassRole::Present => Some((Parts::All, Parts::All)),
         PassRole::LightAssignment
         | PassRole::Resolve
+        | PassRole::Culling
         | PassRole::Transparency
         | PassRole::Filter
         | PassRole::Upkeep => None,

@@ -32,7 +32,7 @@ impl Phase {
         match role {
             PassRole::Shared | PassRole::Transparency => Phase::Indirect,
             PassRole::DepthPrepass => Phase::Prepass,
-            PassRole::Geometry => Phase::Fill,
+            PassRole::Culling | PassRole::Geometry => Phase::Fill,
             PassRole::TriangleSelection => Phase::Find,
             PassRole::Derivatives => Phase::Derivatives,
             PassRole::LightAssignment => Phase::Lights,

@@ -1,14 +1,15 @@
-//! Which draws a view needs, in which order: frustum culling and sorting on the CPU, written as indirect commands.
+//! Which draws a view needs, in which order, and their indirect commands: the CPU's way, and the twin of the device's.
 
 use std::ops::Range;
 
 use afterlight_scene::Aabb;
+use afterlight_shader::structs::{DrawChoiceConstants, ORDER_CENTER, ORDER_NEAR, ORDER_SCENE};
 use glam::{Mat4, Vec3, Vec4};
 
 use crate::{
     Cull, DrawOrder, DrawParams,
     scene::{BUCKETS, DrawInfo, SceneGpu},
-    sort_words::{least_first, place_of},
+    sort_words::place_of,
     upload::put,
 };
 
@@ -31,55 +32,140 @@ pub struct DrawCommand {
 /// Distance between commands in the buffer, bytes.
 pub const COMMAND_BYTES: u64 = size_of::<DrawCommand>() as u64;
 
-/// Draws in view, by bucket, in drawing order.
-#[derive(Clone, Debug, Default)]
-pub struct DrawChoice {
-    /// How draws are chosen and ordered.
-    pub options: DrawParams,
-    /// Draws in view, by bucket, in drawing order.
-    pub visible: [Vec<u32>; BUCKETS],
-    /// What they are sorted by ([`crate::sort_words`]), kept for its memory.
-    keyed: Vec<u64>,
+/// Bins of distance that draws are ordered by: `BINS` in `shared/cull/choice.glsl` of the stages.
+pub const BINS: u32 = 256;
+
+/// Bits of a float's mantissa below a step of distance: eight steps a doubling of a square, so that neighbours are 4.4% apart.
+const STEP_SHIFT: u32 = 20;
+
+/// Half-spaces of a choice.
+const PLANES: usize = 8;
+
+/// Draws of a view, by bucket, in drawing order.
+pub type DrawsInOrder = [Vec<u32>; BUCKETS];
+
+/// What decides which draws a view needs and in which order. The device computes the same from the same constants
+/// (`shared/cull/choice.glsl` of the stages), operation by operation, so that both come to one list.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DrawQuery(pub DrawChoiceConstants);
+
+/// The view that draws are chosen for.
+pub struct QueryView {
+    /// World to clip.
+    pub clip_from_world: Mat4,
+    /// The eye, world space, m.
+    pub eye_ws: Vec3,
+    /// Height of the image, pixels.
+    pub height_px: u32,
+    /// What sizes are divided by at a point p, dot(xyz, p) + w, and the pixels that 1 m is high where that is 1.
+    pub size_on_image: (Vec4, f32),
+    /// Rows of the image that draws are to reach; `None` is all.
+    pub rows: Option<Range<u32>>,
+    /// Box of all draws, world space, displaced.
+    pub bounds_ws: Aabb,
+    /// How far surfaces may be displaced along each axis, m.
+    pub displacement_m: f32,
 }
 
-impl DrawChoice {
-    /// No draws.
-    pub fn new(options: DrawParams) -> Self {
-        Self { options, ..Self::default() }
-    }
+impl DrawQuery {
+    /// Leaves out every draw, but for those whose bounds are no numbers.
+    pub const NOTHING: Self = {
+        Self(DrawChoiceConstants {
+            planes: [[0.0, 0.0, 0.0, -1.0]; PLANES],
+            distance_from_world: [0.0; 4],
+            eye_ws: [0.0; 3],
+            displacement_m: 0.0,
+            least_ratio: 0.0,
+            order: ORDER_SCENE,
+            farthest_step: 0,
+        })
+    };
 
-    /// Chooses and orders the draws for a view, which stand where `infos` says; surfaces may be displaced by `displacement_m` along each axis.
-    pub fn update(
-        &mut self,
-        scene: &SceneGpu,
-        infos: &[DrawInfo],
-        (clip_from_world, eye_ws): (Mat4, Vec3),
-        displacement_m: f32,
-    ) {
-        let frustum = Frustum::new(clip_from_world);
-        let Self { options, visible, keyed } = self;
-        for (bucket, visible) in visible.iter_mut().enumerate() {
-            let (first, end) = (scene.bucket_first[bucket], scene.bucket_first[bucket + 1]);
-            let in_view = |draw: &u32| {
-                let bounds = &infos[*draw as usize].bounds_ws;
-                options.cull == Cull::None || frustum.touches(&displaced(bounds, displacement_m))
-            };
-            keyed.clear();
-            let key = |draw: u32| options.order.key(&infos[draw as usize].bounds_ws, eye_ws);
-            // Draws of one distance keep the scene's order, so that equal depths resolve alike in every technique.
-            keyed.extend((first..end).filter(in_view).map(|draw| least_first(key(draw), draw)));
-            if options.order != DrawOrder::Scene {
-                keyed.sort_unstable();
-            }
-            visible.clear();
-            visible.extend(keyed.iter().copied().map(place_of));
+    /// How a view chooses and orders draws.
+    pub fn new(options: &DrawParams, view: &QueryView) -> Self {
+        let bounds_ws = &view.bounds_ws;
+        let mut planes = Vec::new();
+        // The rows alone cull: what the view does not cull stays in some rows at least.
+        if options.cull == Cull::Frustum {
+            planes.extend(Frustum::new(view.clip_from_world).0);
         }
+        if let Some(rows) = &view.rows {
+            planes.extend(Rows::new(view.clip_from_world, rows.clone(), view.height_px).0);
+        }
+        planes.resize(PLANES, Vec4::W);
+        let (distance_from_world, px_at_one) = view.size_on_image;
+        let farthest_sq =
+            (bounds_ws.min - view.eye_ws).abs().max((bounds_ws.max - view.eye_ws).abs()).length_squared();
+        let mut constants = DrawChoiceConstants {
+            distance_from_world: distance_from_world.into(),
+            eye_ws: view.eye_ws.into(),
+            displacement_m: view.displacement_m,
+            least_ratio: options.cull_px / px_at_one,
+            order: match options.order {
+                DrawOrder::Scene => ORDER_SCENE,
+                DrawOrder::Center => ORDER_CENTER,
+                DrawOrder::Near => ORDER_NEAR,
+            },
+            farthest_step: step_of(farthest_sq),
+            ..DrawChoiceConstants::default()
+        };
+        for (to, plane) in constants.planes.iter_mut().zip(planes) {
+            *to = plane.into();
+        }
+        Self(constants)
     }
 
-    /// Number of draws in view.
-    pub fn count(&self) -> u32 {
-        self.visible.iter().map(|bucket| bucket.len() as u32).sum()
+    /// The bin of a draw with those bounds, 0 the nearest; `None` where it is left out.
+    pub fn bin(&self, bounds_ws: &Aabb) -> Option<u32> {
+        let c = &self.0;
+        let reached = displaced(bounds_ws, c.displacement_m);
+        let planes = c.planes.map(Vec4::from);
+        if !touches(&planes, &reached) || self.is_small(&reached) {
+            return None;
+        }
+        let eye_ws = Vec3::from(c.eye_ws);
+        let distance_sq = match c.order {
+            ORDER_NEAR => distance_sq(bounds_ws, eye_ws),
+            ORDER_CENTER => bounds_ws.center().distance_squared(eye_ws),
+            _ => return Some(0),
+        };
+        Some((step_of(distance_sq) + BINS - 1).saturating_sub(c.farthest_step).min(BINS - 1))
     }
+
+    /// Whether a box is smaller on the image than what is to be drawn, wherever on it: seen from its least view distance.
+    fn is_small(&self, bounds: &Aabb) -> bool {
+        let distance = Vec4::from(self.0.distance_from_world);
+        let size = bounds.max - bounds.min;
+        let center_m = dot(distance.truncate(), (bounds.min + bounds.max) * 0.5) + distance.w;
+        let nearest_m = center_m - 0.5 * dot(distance.truncate().abs(), size);
+        let least_m = self.0.least_ratio * nearest_m;
+        nearest_m > 0.0 && dot(size, size) < least_m * least_m
+    }
+
+    /// Chooses and orders the draws of a scene, which stand where `infos` says: near to far by bins, those of one bin as in the scene.
+    pub fn choose(&self, bucket_first: &[u32; BUCKETS + 1], infos: &[DrawInfo]) -> DrawsInOrder {
+        let mut words: Vec<u64> = Vec::new();
+        std::array::from_fn(|bucket| {
+            let draws = bucket_first[bucket]..bucket_first[bucket + 1];
+            words.clear();
+            words.extend(draws.filter_map(|draw| {
+                let bin = self.bin(&infos[draw as usize].bounds_ws)?;
+                Some(u64::from(bin) << 32 | u64::from(draw))
+            }));
+            words.sort_unstable();
+            words.iter().copied().map(place_of).collect()
+        })
+    }
+}
+
+/// Step of a squared distance on a scale of equal ratios: the upper bits of the float. What is no number is farthest.
+const fn step_of(distance_sq: f32) -> u32 {
+    distance_sq.to_bits() >> STEP_SHIFT
+}
+
+/// Number of draws.
+pub fn count(draws: &DrawsInOrder) -> u32 {
+    draws.iter().map(|bucket| bucket.len() as u32).sum()
 }
 
 /// Writes the commands of draws, one range a bucket, into a buffer with room for every draw of the scene.
@@ -115,20 +201,10 @@ pub fn displaced(bounds: &Aabb, displacement_m: f32) -> Aabb {
     Aabb { min: bounds.min - margin, max: bounds.max + margin }
 }
 
-impl DrawOrder {
-    /// What draws are sorted by.
-    fn key(self, bounds: &Aabb, eye_ws: Vec3) -> f32 {
-        match self {
-            Self::Near => distance_sq(bounds, eye_ws),
-            Self::Center => bounds.center().distance_squared(eye_ws),
-            Self::Scene => 0.0,
-        }
-    }
-}
-
 /// Squared distance from a point to a box, 0 inside.
 fn distance_sq(bounds: &Aabb, point: Vec3) -> f32 {
-    point.clamp(bounds.min.min(bounds.max), bounds.max.max(bounds.min)).distance_squared(point)
+    let (low, high) = (bounds.min.min(bounds.max), bounds.max.max(bounds.min));
+    point.max(low).min(high).distance_squared(point)
 }
 
 /// Half-spaces of a view: inside where dot(xyz, p) + w ≥ 0.
@@ -178,8 +254,13 @@ fn touches(planes: &[Vec4], bounds: &Aabb) -> bool {
     !planes.iter().any(|plane| {
         let n = plane.truncate();
         let farthest = Vec3::select(n.cmpge(Vec3::ZERO), bounds.max, bounds.min);
-        n.dot(farthest) + plane.w < 0.0
+        dot(n, farthest) + plane.w < 0.0
     })
+}
+
+/// The dot product in the order of sums that the device has.
+fn dot(a: Vec3, b: Vec3) -> f32 {
+    a.x * b.x + a.y * b.y + a.z * b.z
 }
 
 #[cfg(test)]

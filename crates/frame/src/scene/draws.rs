@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use afterlight_scene::{Aabb, AlphaMode, Material, Scene, TextureRef};
-use afterlight_shader::structs::{DRAW_MIRRORED, DrawData, TRIANGLE_BITS};
+use afterlight_shader::structs::{DRAW_MIRRORED, DrawBounds, DrawData, TRIANGLE_BITS};
 
 use super::placed::{DrawSource, object_rows};
 use crate::TechniqueError;
@@ -161,6 +161,18 @@ impl DrawTable {
         }
         check_count(table.data.len() as u64)?;
         Ok(table)
+    }
+
+    /// What the device chooses draws by, of all draws.
+    pub(super) fn bounds(&self) -> Vec<DrawBounds> {
+        let infos = self.infos.iter().chain(&self.blended);
+        let of_draw = |(source, info): (&DrawSource, &DrawInfo)| DrawBounds {
+            min_os: source.bounds_os.min.into(),
+            index_count: info.index_count,
+            max_os: source.bounds_os.max.into(),
+            unused: 0,
+        };
+        self.sources.iter().zip(infos).map(of_draw).collect()
     }
 }
 

@@ -45,6 +45,8 @@ pub struct SceneGpu {
     pub draws: gpu::Buffer,
     /// The same, four texels a draw, for compute.
     pub draw_data: gpu::Image,
+    /// One `DrawBounds` a draw, two texels: what the device chooses draws by.
+    pub draw_bounds: gpu::Image,
     /// Eight texels a material.
     pub materials: gpu::Image,
     /// Materials of the scene, those that no draw has included.
@@ -99,6 +101,7 @@ impl SceneGpu {
             pieces[scene.instances[*instance as usize].mesh as usize].fill(*bounds_os);
         }
         let draws = DrawTable::new(scene, &pieces)?;
+        let bounds = draws.bounds();
         let blended =
             Blended::new(scene, &indices, &draws.data[draws.infos.len()..], draws.blended, draws.infos.len());
         let table = TextureTable::plan(scene, device.features(), &mut warnings)?;
@@ -110,6 +113,7 @@ impl SceneGpu {
         let draw_buffer = upload_slice(device, &mut uploader, "scene draws", &draws.data)?;
         let uint4 = vk::Format::R32G32B32A32_UINT;
         let draw_data = record_image(device, &mut uploader, "scene draw records", &draws.data, 4, uint4)?;
+        let draw_bounds = record_image(device, &mut uploader, "scene draw bounds", &bounds, 2, uint4)?;
         let materials = record_image(device, &mut uploader, "scene materials", &materials, 8, uint4)?;
         let uv_transforms = upload_slice(device, &mut uploader, "scene texture transforms", &transforms)?;
         let deformed = DeformedGpu::upload(device, &mut uploader, scene, rest_bounds_os)?;
@@ -126,10 +130,13 @@ impl SceneGpu {
             ("HAS_UV_TRANSFORM", u32::from(!transforms.is_empty())),
         ];
         let buffers = [&positions, &attributes, &indices, &draw_buffer, &uv_transforms];
-        let images = draw_data.allocated_bytes() + materials.allocated_bytes() + textures.bytes;
+        let images = [&draw_data, &draw_bounds, &materials].map(gpu::Image::allocated_bytes);
         let shapes = deformed.as_ref().map_or(0, DeformedGpu::bytes);
         Ok(Arc::new(Self {
-            bytes: buffers.iter().map(|b| b.allocated_bytes()).sum::<u64>() + images + shapes,
+            bytes: buffers.iter().map(|b| b.allocated_bytes()).sum::<u64>()
+                + images.iter().sum::<u64>()
+                + textures.bytes
+                + shapes,
             texture_set: textures.set,
             material_count: scene.materials.len() as u32,
             has_emission: scene.materials.iter().any(|m| !m.unlit && m.emissive_factor != [0.0; 3]),
@@ -143,6 +150,7 @@ impl SceneGpu {
             bucket_first: draws.bucket_first,
             draws: draw_buffer,
             draw_data,
+            draw_bounds,
             positions,
             attributes,
             indices,

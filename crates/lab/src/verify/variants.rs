@@ -10,6 +10,7 @@ const VISIBILITY: (&str, [&str; 2]) = ("visibility", ["raster", "compute"]);
 
 /// Parameters that change the picture by design, or only name what another one chooses: they are left as they are.
 const NOT_DRAWN: &[(&str, &str)] = &[
+    ("cull-px", "draws that are left out are missing from the picture"),
     ("order", "the order of draws decides between equal depths"),
     ("position", "the depth of a sample is not that of the pixel's centre"),
     ("filter", "pixels that a filter leaves out are not anti-aliased"),

@@ -18,6 +18,7 @@ use afterlight_frame::{
 use afterlight_shader::Shader;
 use afterlight_stages::{
     lights::{cells, step},
+    shared::cull,
     surfaces::shade::SurfaceSource,
     surfaces::{
         claims,
@@ -102,7 +103,7 @@ impl Technique for DaisList {
         for (first_row, number) in (0..frame.height_px).step_by(rows as usize).zip(1..) {
             let end_row = (first_row + rows).min(frame.height_px);
             let draws =
-                frame.draws_in_rows(graph, &format!("dais-list/draws {number}"), first_row..end_row)?;
+                cull::in_rows(graph, frame, &format!("dais-list/draws {number}"), first_row..end_row)?;
             let band = Band { number, first_row, draws };
             depth = band.draw_depth(graph, frame, depth)?;
             (depth, lists, triangles) = band.fill(graph, frame, depth, lists, triangles)?;

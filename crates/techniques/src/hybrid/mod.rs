@@ -4,6 +4,8 @@
 
 pub mod cost;
 
+use std::borrow::Cow;
+
 use afterlight_graph::{
     Blend, BufferHandle, BufferRole, Commands, DepthTest, Graph, ImageHandle, Load, PassRole, RasterPass,
     StencilFace, StencilTest, Step, gpu::vk,
@@ -12,7 +14,8 @@ use afterlight_graph::{
 use crate::light_prepass::{self, SUMS};
 use afterlight_cost::{Cost, Workload};
 use afterlight_frame::{
-    Answers, AppendixA, Exactness, Frame, Info, Need, Params, Source, Technique, TechniqueError, View,
+    Answers, AppendixA, ChangesWith, Exactness, Frame, Info, Need, Params, Source, Technique, TechniqueError,
+    View,
     scene::{BUCKETS, Bucket, draw_list::COMMAND_BYTES},
 };
 use afterlight_shader::Shader;
@@ -89,6 +92,8 @@ const COLORLESS: u32 = 0;
 /// The draws in view, which take one path or the other.
 struct Draws {
     params: HybridParams,
+    /// The host's own commands of the draws in view: the host's runs count places in them.
+    commands: BufferHandle,
     /// Length of each run.
     counts: BufferHandle,
 }
@@ -110,7 +115,11 @@ impl Draws {
         let counts = frame.table_of_view(graph, named, most, move |view| {
             runs(params, view).iter().map(|run| run.places.len() as u32).collect()
         })?;
-        Ok(Self { params, counts })
+        let named = ("hybrid own draw", ChangesWith::Camera);
+        let of_view = frame
+            .inputs
+            .declare_draws(frame.device, graph, named, frame.scene, |view| Cow::Borrowed(view.visible()))?;
+        Ok(Self { params, commands: of_view.commands, counts })
     }
 
     /// Whether some view has draws on a path.
@@ -137,7 +146,8 @@ impl Draws {
             for bucket in (0..BUCKETS).map(Bucket) {
                 let [first, end] = [bucket.0, bucket.0 + 1].map(|place| frame.scene.bucket_first[place]);
                 if first < end {
-                    surfaces.draw_some(frame, pass, (bucket, &(0..end - first)), (&self.counts, 0));
+                    let places = 0..end - first;
+                    surfaces.draw_some(frame, pass, (bucket, &places), (&self.commands, (&self.counts, 0)));
                     numbered.push((path, bucket));
                 }
             }

@@ -59,14 +59,14 @@ type Span = [f64; 2];
 
 /// All draws in view on one path.
 pub(super) fn one_path(view: &View<'_>, path: Path) -> Vec<Run> {
-    runs(view.visible.each_ref().map(|draws| vec![path; draws.len()]))
+    runs(view.visible().each_ref().map(|draws| vec![path; draws.len()]))
 }
 
 /// Every draw in view on the path that is predicted to read and write less; `prepass_weight` is a factor on what the light pre-pass
 /// does.
 pub(super) fn predicted(view: &View<'_>, prepass_weight: f32) -> Vec<Run> {
     let draws: Vec<&DrawInfo> =
-        view.visible.iter().flatten().map(|draw| &view.placed.infos[*draw as usize]).collect();
+        view.visible().iter().flatten().map(|draw| &view.placed.infos[*draw as usize]).collect();
     let size = [view.settings.width_px, view.settings.height_px];
     let displacement_m = view.displacement_m();
     let footprints: Vec<Footprint> = draws
@@ -82,7 +82,7 @@ pub(super) fn predicted(view: &View<'_>, prepass_weight: f32) -> Vec<Run> {
         choose(draws[i], fragments, fragments * left[i], f64::from(prepass_weight))
     };
     let mut chosen = (0..draws.len()).map(path);
-    runs(view.visible.each_ref().map(|bucket| chosen.by_ref().take(bucket.len()).collect()))
+    runs(view.visible().each_ref().map(|bucket| chosen.by_ref().take(bucket.len()).collect()))
 }
 
 /// The path that reads and writes less for a draw of which `fragments` are shaded and `pixels` stay to be seen: the terms of D and of

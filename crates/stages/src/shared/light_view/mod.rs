@@ -1,7 +1,7 @@
 //! A light's view of the scene: which light it is, and how a frame looks through it. What indirect light is gathered from
 //! (`shared/indirect/`) and shadows (`shared/shadow/`) are passes through it.
 
-use std::{borrow::Cow, f32::consts::PI};
+use std::f32::consts::PI;
 
 use afterlight_graph::{BufferHandle, BufferRole, Graph, gpu::vk};
 use afterlight_scene::{Aabb, Camera, Light, LightKind, Projection};
@@ -11,8 +11,10 @@ use glam::{Mat4, Vec3};
 
 use afterlight_frame::{
     CameraView, ChangesWith, DrawParams, Frame, SceneGpu, Settings, TechniqueError, View, put,
-    scene::draw_list::DrawChoice,
+    scene::draw_list::DrawQuery,
 };
+
+use crate::shared::cull::SceneOfDraws;
 
 /// Widest angle of a light's perspective view, radians: further out a texel has hardly any solid angle.
 const WIDEST_RAD: f32 = 150.0 / 180.0 * PI;
@@ -148,14 +150,12 @@ pub fn look_through<T>(
             ..camera.constants(view.settings, view.lights, &view.bounds_ws())
         })
     })?;
+    let scene = SceneOfDraws::of(frame);
+    let options = DrawParams { cull_on: scene.cull_on, ..DrawParams::default() };
     let named = (&*format!("{pass} draw"), ChangesWith::Pose);
-    let draws = frame.inputs.declare_draws(frame.device, graph, named, frame.scene, move |view| {
-        let mut choice = DrawChoice::new(DrawParams::default());
-        if let Some(camera) = through(view, size_px) {
-            let from = (camera.clip_from_world, camera.eye_ws);
-            choice.update(view.scene, &view.placed.infos, from, view.displacement_m());
-        }
-        Cow::Owned(choice.visible)
+    let draws = scene.by_query(graph, named, move |view| match through(view, size_px) {
+        Some(camera) => view.query_of(&options, &camera, None),
+        None => DrawQuery::NOTHING,
     })?;
     let imported = [constants, draws.commands, draws.counts];
     let b = &mut frame.buffers;

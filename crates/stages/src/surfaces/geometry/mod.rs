@@ -222,18 +222,18 @@ impl SceneDraws {
         frame.scene.bucket_first.windows(2).filter(|ends| ends[0] < ends[1]).count() as u32
     }
 
-    /// Adds some of the draws in view to a pass: a bucket's, by their places in its order. Word `word` of `counts` is their number:
+    /// Adds some of the draws that `commands` has to a pass: a bucket's, by their places in its order. Word `word` of `counts` is their number:
     /// lavapipe (Mesa 22.3) gives an indirect call without a count the count of the call before.
     pub fn draw_some(
         &self,
         frame: &Frame<'_>,
         pass: &mut RasterPass<'_>,
         (bucket, places): (Bucket, &Range<u32>),
-        (counts, word): (&BufferHandle, usize),
+        (commands, (counts, word)): (&BufferHandle, (&BufferHandle, usize)),
     ) {
         let first = frame.scene.bucket_first[bucket.0] + places.start;
         let call = DrawCall::IndexedIndirectCount {
-            buffer: &frame.buffers.commands,
+            buffer: commands,
             offset: COMMAND_BYTES * u64::from(first),
             count_buffer: counts,
             count_offset: 4 * word as u64,
