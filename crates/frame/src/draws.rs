@@ -15,10 +15,38 @@ choices! {
 choices! {
     /// Who chooses draws and puts them in order. Both come to the same, bit by bit.
     pub enum CullOn {
-        /// The device, by two dispatches before the first pass: the host's time does not grow with the number of draws.
+        /// The device where the scene has many draws, else the host: two dispatches cost a frame more than a few hundred draws the host.
+        Auto = "auto",
+        /// The device, by two dispatches before the first pass: the host's time does not grow with the number of draws. It sorts
+        /// triangles with alpha blending as well.
         Gpu = "gpu",
         /// The host, which writes indirect commands for each view.
         Cpu = "cpu",
+    }
+}
+
+/// Most draws that the host chooses of its own accord: some 20 ns each and frame.
+const DRAWS_ON_HOST_MAX: usize = 2048;
+/// Most triangles with alpha blending that it sorts so: some 40 ns each and frame.
+const BLENDED_ON_HOST_MAX: usize = 4096;
+
+impl CullOn {
+    /// Whether the device chooses the draws of a scene with so many.
+    pub const fn chooses_on_device(self, draws: usize) -> bool {
+        self.is_device(draws, DRAWS_ON_HOST_MAX)
+    }
+
+    /// Whether the device sorts so many triangles with alpha blending.
+    pub const fn sorts_on_device(self, triangles: usize) -> bool {
+        self.is_device(triangles, BLENDED_ON_HOST_MAX)
+    }
+
+    const fn is_device(self, found: usize, on_host_max: usize) -> bool {
+        match self {
+            Self::Auto => found > on_host_max,
+            Self::Gpu => true,
+            Self::Cpu => false,
+        }
     }
 }
 
@@ -43,7 +71,7 @@ parameters! {
         /// draws outside the view are left out
         cull: Cull = Cull::Frustum, "cull";
         /// who chooses and orders draws, the device or the host; the picture is the same
-        cull_on: CullOn = CullOn::Gpu, "cull-on";
+        cull_on: CullOn = CullOn::Auto, "cull-on";
         /// draws whose bounds are smaller than so many pixels across are left out, which changes the picture; 0 leaves out none
         cull_px: f32 = 0.0, "cull-px", 0.0..=64.0;
         /// order of draws: by the nearest point or the centre of their bounds, or as in the scene

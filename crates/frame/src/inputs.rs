@@ -193,6 +193,22 @@ impl ViewInputs {
         Ok((stream, records))
     }
 
+    /// What the device chooses draws by, for each pose.
+    ///
+    /// # Errors
+    /// The device.
+    pub fn declare_bounds(
+        &self,
+        device: &gpu::Device,
+        graph: &mut Graph,
+        scene: &SceneGpu,
+    ) -> Result<ImageHandle, TechniqueError> {
+        let named = ("scene draw bounds", BufferRole::Scene);
+        self.declare_like(device, graph, named, &scene.draw_bounds, |view, bytes| {
+            put(bytes, 0, &view.placed.draw_bounds);
+        })
+    }
+
     /// Records and spheres of lights, for each pose.
     ///
     /// # Errors

@@ -11,7 +11,7 @@ use afterlight_shader::{Shader, structs::FrameConstants};
 
 use crate::prepared::{Kept, Moved, Prepared, Viewed};
 use afterlight_frame::{
-    Board, CameraView, ChangesWith, Cull, CullOn, DrawParams, Frame, MAX_DISPLACEMENT_MM, MIN_TESSELLATE_PX,
+    Board, CameraView, ChangesWith, CullOn, DrawParams, Frame, MAX_DISPLACEMENT_MM, MIN_TESSELLATE_PX,
     OpaqueDepth, Params, SceneBuffers, SceneLights, Settings, Technique, TechniqueError, TessellationEffect,
     ViewInputs,
     camera_view::{background_radiance, coarse_depth_warning},
@@ -139,7 +139,7 @@ impl Renderer {
             self.view().projection(),
             self.distance_range_m(),
         );
-        [indirect::warning, shadow::warning, transparent::warning]
+        [indirect::warning, shadow::warning]
             .into_iter()
             .filter_map(|warning| warning(&self.settings, &self.scene))
             .chain(coarse)
@@ -285,7 +285,7 @@ impl Renderer {
         let options = *params.typed::<DrawParams>();
         let viewed = Viewed::new(settings, self.scene.clone(), self.lights.clone(), moved, options);
         let view = viewed.view();
-        let blended = BlendedList::of_view(&view, options.cull == Cull::Frustum, moves);
+        let blended = BlendedList::of_view(&view, &options, moves);
 
         let inputs = ViewInputs::default();
         let mut graph = Graph::new();
@@ -382,7 +382,10 @@ impl Renderer {
         );
         let given = deform::Given { device: &self.device, inputs, scene: s, shaders };
         let (positions, attributes) = deform::record(graph, &given, positions, attributes)?;
-        let bounds = graph.import_image("scene draw bounds", BufferRole::Scene, &s.draw_bounds, UPLOADED);
+        let bounds = match alive && s.deformed.is_some() {
+            true => inputs.declare_bounds(&self.device, graph, s)?,
+            false => graph.import_image("scene draw bounds", BufferRole::Scene, &s.draw_bounds, UPLOADED),
+        };
         let scene = SceneOfDraws {
             device: &self.device,
             inputs,

@@ -81,6 +81,16 @@ shader_struct! {
         pub unused: u32,
     }
 
+    /// A triangle with alpha blending, by which it is put in order (`compose/transparent/order.glsl` of the stages).
+    pub struct BlendedTriangle {
+        /// Centroid, object space.
+        pub centroid_os: [f32; 3],
+        /// Its draw, by its number in the scene.
+        pub draw: u32,
+        /// First of its three indices in the scene's.
+        pub first_index: u32,
+    }
+
     /// One draw: at most 1,024 triangles of one instance; four texels, and the vertex stream of instances
     /// (`include/scene.glsl`).
     pub struct DrawData {
@@ -196,6 +206,7 @@ pub const LAYOUTS: &[crate::StructLayout] = &[
     ShadowConstants::LAYOUT,
     DrawChoiceConstants::LAYOUT,
     DrawBounds::LAYOUT,
+    BlendedTriangle::LAYOUT,
     DrawData::LAYOUT,
     DeformGroup::LAYOUT,
     Deformed::LAYOUT,

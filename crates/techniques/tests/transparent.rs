@@ -2,21 +2,23 @@
 
 mod common;
 
+use afterlight_frame::completed;
 use afterlight_oracle::raster::{RayScene, pixel_ray};
-use afterlight_renderer::Renderer;
-use afterlight_stages::compose::transparent::SORTED_TRIANGLES_MAX;
 use afterlight_techniques::{
-    Frame, Info, Params, SHADERS, Settings, Technique, TechniqueError, Transparency,
+    CullOn, DrawParams, Frame, Info, Params, SHADERS, Settings, Technique, TechniqueError, Transparency,
     cost::{Cost, Workload},
     find,
     graph::{BufferRole, Graph, ImageHandle, ImageInfo, Load, PassRole, gpu::vk},
     registry,
     scene::{
         Aabb, AlphaMode, Camera, Instance, Material, Mesh, Projection, Scene, VertexAttributes, load_source,
+        rng::SplitMix64,
     },
     shader::Shader,
 };
-use common::{Stage, compiled, image_of, least_db, lights_of_each_kind, psnr, radiance_of, source};
+use common::{
+    Stage, compiled, compiled_variant, image_of, least_db, lights_of_each_kind, psnr, radiance_of, source,
+};
 use glam::{Affine3A, DVec3, Quat, Vec3};
 
 /// Squares that face +z of their own space, one mesh, placed in the world.
@@ -549,34 +551,84 @@ fn tessellated_panes_are_those_that_are_not() {
     }
 }
 
-/// Beyond the bound draws are sorted, and that is told.
+/// The scene with all of its surfaces blended, and cameras at random places in it.
+fn all_blended(source: &str, instances: usize) -> (Scene, Vec<Camera>) {
+    let mut scene = load_source(source, &Default::default()).unwrap_or_else(|e| panic!("{e}"));
+    for material in &mut scene.materials {
+        (material.alpha_mode, material.base_color_factor[3]) = (AlphaMode::Blend, 0.5);
+    }
+    let mut random = SplitMix64::new(6);
+    let mut point = |size: f32| {
+        Vec3::new(random.next_f32() - 0.5, random.next_f32() - 0.5, random.next_f32() - 0.5) * size
+    };
+    let one = scene.instances[0].clone();
+    scene.instances.extend((1..instances).map(|_| {
+        let world_from_object = Affine3A::from_translation(point(9.0)) * one.world_from_object;
+        Instance { world_from_object, ..one.clone() }
+    }));
+    let camera = |i| {
+        let camera = Camera::look_at("random", point(8.0), point(4.0), 1.2, 0.05);
+        let projection = Projection::Orthographic { half_height_m: 3.0, near_m: 0.0, far_m: 30.0 };
+        if i % 2 == 1 { Camera { projection, ..camera } } else { camera }
+    };
+    let cameras = (0..4).map(camera).collect();
+    (scene, cameras)
+}
+
+/// A frame whose triangles the device or the host sorts, with shaders in place of the stage's own.
+fn sorted_on(stage: &Stage, settings: &Settings, cull_on: CullOn, shaders: &[Shader]) -> Vec<[f32; 4]> {
+    let technique = find("forward").unwrap();
+    let mut params = completed(technique, &Params::default());
+    params.typed_mut::<DrawParams>().cull_on = cull_on;
+    let settings = Settings { keep_hdr: true, ..settings.clone() };
+    radiance_of(&mut stage.prepare_shaders(technique, &settings, &params, shaders.iter().cloned()))
+}
+
+/// Device and host come to one order: the same bits, few triangles or many, in one run or each in its own.
 #[test]
-fn too_many_triangles_are_told() {
+fn the_device_sorts_as_the_host() {
     let gpu = afterlight_testkit::gpu();
-    for (segments, too_many) in [(32, false), (336, true)] {
-        let source = format!("builtin:sphere?segments={segments}");
-        let mut scene = load_source(&source, &Default::default()).unwrap_or_else(|e| panic!("{e}"));
-        for material in &mut scene.materials {
-            (material.alpha_mode, material.base_color_factor[3]) = (AlphaMode::Blend, 0.5);
-        }
+    let sphere = "builtin:sphere?segments";
+    for (source, instances) in
+        [(format!("{sphere}=6"), 1), (format!("{sphere}=16"), 40), (format!("{sphere}=336"), 1)]
+    {
+        let (scene, cameras) = all_blended(&source, instances);
         let stage = Stage::of(&gpu, scene);
-        let found = stage.uploaded.blended_triangle_count();
-        assert_eq!(found > SORTED_TRIANGLES_MAX as u64, too_many, "{found} triangles");
-        let settings = stage.settings((64, 36), 0);
-        let warnings = |settings: &Settings| {
-            let renderer = Renderer::with_scene(&gpu, stage.uploaded.clone(), settings);
-            renderer.unwrap_or_else(|e| panic!("{e}")).warnings()
-        };
-        let told = warnings(&settings);
-        println!("{told:?}");
-        assert_eq!(told.iter().any(|w| w.contains(&format!("{found} triangles"))), too_many);
-        assert!(
-            warnings(
-                &settings.clone().with_effects(|effects| effects.transparency.order = Transparency::None)
-            )
-            .is_empty()
-        );
-        let image = stage.image(find("forward").unwrap(), &settings);
-        assert!(common::covered(&image) > 0.05, "nothing is drawn");
+        println!("{source}: {} triangles", stage.uploaded.blended_triangle_count());
+        for (camera, samples) in cameras.into_iter().zip([1, 4, 1, 1]) {
+            let settings = Settings { camera, samples, ..stage.settings((64, 36), 3) };
+            let [device, host] = [CullOn::Gpu, CullOn::Cpu].map(|on| sorted_on(&stage, &settings, on, &[]));
+            assert!(device == host, "{source}: {:?}", settings.camera);
+            assert!(device == sorted_on(&stage, &settings, CullOn::Auto, &[]));
+        }
+    }
+}
+
+/// Mutants that pair the beginning of a run with the end of another one are not tried: their commands have billions of indices.
+#[test]
+fn wrong_orders_of_the_device_are_caught() {
+    let gpu = afterlight_testkit::gpu();
+    let (scene, cameras) = all_blended("builtin:sphere?segments=16", 40);
+    let stage = Stage::of(&gpu, scene);
+    let views: Vec<Settings> =
+        cameras.into_iter().map(|camera| Settings { camera, ..stage.settings((64, 36), 3) }).collect();
+    let expected: Vec<_> = views.iter().map(|view| sorted_on(&stage, view, CullOn::Cpu, &[])).collect();
+    let [keys, count, write] = ["keys", "count_runs", "write_runs"].map(|pass| {
+        (format!("compose/transparent/{pass}.comp"), format!("compose/transparent/{pass}.comp.glsl"))
+    });
+    for ((shader, file), from, to) in [
+        (&keys, "min(~sortable_bits(", "min(sortable_bits("),
+        (&keys, "if (is_in_view(", "if (!is_in_view("),
+        (&keys, "view_distance_m(draw, triangle.centroid_os)", "view_distance_m(draw, vec3(0.0))"),
+        (&count, "draw_commands[place * 5u] = 0u;", "draw_commands[place * 5u] = 3u;"),
+        (&write, "draw_commands[at + 2u] = place * 3u;", "draw_commands[at + 2u] = place * 3u + 3u;"),
+        (&write, "if (ends_run(place)) {", "if (ends_run(place) && run > 0u) {"),
+        (&write, "draw_count = all_runs;", "draw_count = all_runs - 1u;"),
+    ] {
+        let wrong = compiled_variant(shader, file, &[(from, to)]);
+        let is_caught = views.iter().zip(&expected).any(|(view, expected)| {
+            sorted_on(&stage, view, CullOn::Gpu, std::slice::from_ref(&wrong)) != *expected
+        });
+        assert!(is_caught, "{shader}: {to:?} goes unseen");
     }
 }

@@ -3,12 +3,12 @@
 use std::{ops::Range, sync::Arc};
 
 use afterlight_scene::{Aabb, Scene};
-use afterlight_shader::structs::DrawData;
+use afterlight_shader::structs::{BlendedTriangle, DrawData};
 use glam::{Mat4, Vec3, Vec4};
 
 use crate::scene::{
     DrawInfo,
-    draw_list::{DrawCommand, Frustum, displaced},
+    draw_list::{DrawCommand, Frustum, displaced, dot},
 };
 use crate::sort_words::{greatest_first, place_of};
 
@@ -24,6 +24,20 @@ pub struct Blended {
     corners: Arc<[[u32; 3]]>,
     /// The draw of each, by its place in `draws`.
     draw_of: Arc<[u32]>,
+}
+
+/// What the device orders triangles by, of all of them, draw by draw.
+pub(super) fn records(blended: &Blended, infos: &[DrawInfo]) -> Vec<BlendedTriangle> {
+    let of_draw = |(draw, info): (&BlendedDraw, &DrawInfo)| {
+        let first = draw.triangles.start;
+        let (number, first_index) = (draw.number, info.first_index);
+        draw.triangles.clone().map(move |triangle| BlendedTriangle {
+            centroid_os: blended.centroids_os[triangle].into(),
+            draw: number,
+            first_index: first_index + 3 * (triangle - first) as u32,
+        })
+    };
+    blended.draws.iter().zip(infos).flat_map(of_draw).collect()
 }
 
 #[derive(Clone)]
@@ -44,8 +58,6 @@ pub struct ViewOrder {
     pub distance_from_world: Vec4,
     /// How far surfaces may be displaced along each axis, m.
     pub displacement_m: f32,
-    /// Orders triangles up to this many, beyond it draws.
-    pub triangles_max: usize,
 }
 
 /// Triangles in drawing order.
@@ -71,12 +83,12 @@ impl Blended {
         scene: &Scene,
         indices: &[u32],
         records: &[DrawData],
-        infos: Vec<DrawInfo>,
+        infos: &[DrawInfo],
         first_number: usize,
     ) -> Self {
         let (mut draws, mut all_corners, mut draw_of) = (Vec::new(), Vec::new(), Vec::new());
         let (mut centroids_os, mut centroids_ws) = (Vec::new(), Vec::new());
-        for (k, (record, info)) in records.iter().zip(&infos).enumerate() {
+        for (k, (record, info)) in records.iter().zip(infos).enumerate() {
             let first = all_corners.len();
             let positions_os = &scene.positions_os[info.first_vertex as usize..];
             for corners in indices[info.first_index as usize..][..info.index_count as usize].chunks_exact(3) {
@@ -121,26 +133,28 @@ impl Blended {
         self.draws.len()
     }
 
-    /// Orders the triangles of the draws in view from far to near by the view distance of their centroids; those of one distance as
-    /// in the scene.
-    pub fn order(&self, view: &ViewOrder) -> Ordered {
+    /// Places of the draws in view.
+    fn in_view<'a>(&'a self, view: &'a ViewOrder) -> impl Iterator<Item = usize> + 'a {
         let frustum = view.cull.map(Frustum::new);
-        let in_view = |draw: &BlendedDraw| {
+        let is_in_view = move |draw: &BlendedDraw| {
             let reached = displaced(&draw.bounds_ws, view.displacement_m);
             frustum.as_ref().is_none_or(|frustum| frustum.touches(&reached))
         };
-        let visible: Vec<usize> =
-            (0..self.draws.len()).filter(|place| in_view(&self.draws[*place])).collect();
-        let distance = |p: Vec3| view.distance_from_world.dot(p.extend(1.0));
+        (0..self.draws.len()).filter(move |place| is_in_view(&self.draws[*place]))
+    }
+
+    /// Number of draws in view.
+    pub fn in_view_count(&self, view: &ViewOrder) -> u32 {
+        self.in_view(view).count() as u32
+    }
+
+    /// Orders the triangles of the draws in view from far to near by the view distance of their centroids; those of one distance as
+    /// in the scene. The device comes to the same order (`compose/transparent/` of the stages).
+    pub fn order(&self, view: &ViewOrder) -> Ordered {
+        let visible: Vec<usize> = self.in_view(view).collect();
+        let from_world = view.distance_from_world;
+        let distance = |p: Vec3| dot(from_world.truncate(), p) + from_world.w;
         let mut ordered = Ordered { draw_count: visible.len() as u32, ..Ordered::default() };
-        if self.triangle_count() > view.triangles_max {
-            let of_draw = |place: usize| (distance(self.draws[place].bounds_ws.center()), place);
-            for place in back_to_front(visible.into_iter().map(of_draw)) {
-                let draw = &self.draws[place];
-                ordered.push(draw, &self.corners[draw.triangles.clone()]);
-            }
-            return ordered;
-        }
         let triangles = visible.into_iter().flat_map(|place| self.draws[place].triangles.clone());
         let of_triangle = |triangle: usize| (distance(self.centroids_ws[triangle]), triangle);
         for triangle in back_to_front(triangles.map(of_triangle)) {
@@ -161,7 +175,7 @@ fn back_to_front(keyed: impl Iterator<Item = (f32, usize)>) -> impl Iterator<Ite
 
 fn to_world(record: &DrawData, p_os: Vec3) -> Vec3 {
     let rows = [record.object_row0, record.object_row1, record.object_row2];
-    Vec3::from(rows.map(|row| Vec4::from(row).dot(p_os.extend(1.0))))
+    Vec3::from(rows.map(|[x, y, z, w]| dot(Vec3::new(x, y, z), p_os) + w))
 }
 
 impl Ordered {
@@ -210,9 +224,7 @@ mod tests {
         Blended { draws: blended, centroids_os, centroids_ws, corners, draw_of }
     }
 
-    fn view(triangles_max: usize) -> ViewOrder {
-        ViewOrder { cull: None, distance_from_world: Vec4::NEG_Z, displacement_m: 0.0, triangles_max }
-    }
+    const VIEW: ViewOrder = ViewOrder { cull: None, distance_from_world: Vec4::NEG_Z, displacement_m: 0.0 };
 
     /// Draw and triangles of each run.
     fn runs(ordered: &Ordered) -> Vec<(u32, Vec<u32>)> {
@@ -228,9 +240,9 @@ mod tests {
     fn triangles_run_from_far_to_near() {
         let scene = blended(&[&[1.0, 5.0, 2.0], &[3.0, 4.0]]);
         let expected = vec![(10, vec![1]), (11, vec![1, 0]), (10, vec![2, 0])];
-        assert_eq!(runs(&scene.order(&view(100))), expected);
+        assert_eq!(runs(&scene.order(&VIEW)), expected);
         // The other way round from the other side.
-        let behind = ViewOrder { distance_from_world: Vec4::Z, ..view(100) };
+        let behind = ViewOrder { distance_from_world: Vec4::Z, ..VIEW };
         let expected = vec![(10, vec![0, 2]), (11, vec![0, 1]), (10, vec![1])];
         assert_eq!(runs(&scene.order(&behind)), expected);
     }
@@ -239,16 +251,7 @@ mod tests {
     fn equal_distances_keep_the_order_of_the_scene() {
         let scene = blended(&[&[2.0; 5], &[2.0; 3], &[2.0, 3.0]]);
         let expected = vec![(12, vec![1]), (10, vec![0, 1, 2, 3, 4]), (11, vec![0, 1, 2]), (12, vec![0])];
-        assert_eq!(runs(&scene.order(&view(100))), expected);
-    }
-
-    #[test]
-    fn too_many_triangles_are_sorted_by_draws() {
-        let scene = blended(&[&[1.0, 5.0, 2.0], &[3.0, 4.0]]);
-        // Bounds' centres are 3 and 3.5 m away.
-        let by_draw = vec![(11, vec![0, 1]), (10, vec![0, 1, 2])];
-        assert_eq!(runs(&scene.order(&view(4))), by_draw);
-        assert_ne!(runs(&scene.order(&view(5))), by_draw);
+        assert_eq!(runs(&scene.order(&VIEW)), expected);
     }
 
     #[test]
@@ -256,7 +259,7 @@ mod tests {
         let scene = blended(&[&[1.0, 2.0], &[-1.0, -2.0]]);
         let camera = Camera::look_at("along -z", Vec3::ZERO, Vec3::NEG_Z, 1.0, 0.1);
         let clip_from_world = camera.clip_from_view(1.0) * camera.view_from_world();
-        let culled = ViewOrder { cull: Some(clip_from_world), ..view(100) };
+        let culled = ViewOrder { cull: Some(clip_from_world), ..VIEW };
         let ordered = scene.order(&culled);
         assert_eq!((runs(&ordered), ordered.draw_count), (vec![(10, vec![1, 0])], 1));
         let displaced = ViewOrder { displacement_m: 1.5, ..culled };

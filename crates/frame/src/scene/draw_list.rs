@@ -259,7 +259,7 @@ fn touches(planes: &[Vec4], bounds: &Aabb) -> bool {
 }
 
 /// The dot product in the order of sums that the device has.
-fn dot(a: Vec3, b: Vec3) -> f32 {
+pub(super) fn dot(a: Vec3, b: Vec3) -> f32 {
     a.x * b.x + a.y * b.y + a.z * b.z
 }
 

@@ -47,6 +47,8 @@ pub struct SceneGpu {
     pub draw_data: gpu::Image,
     /// One `DrawBounds` a draw, two texels: what the device chooses draws by.
     pub draw_bounds: gpu::Image,
+    /// One `BlendedTriangle` a triangle with alpha blending.
+    pub blended_triangles: gpu::Buffer,
     /// Eight texels a material.
     pub materials: gpu::Image,
     /// Materials of the scene, those that no draw has included.
@@ -102,8 +104,14 @@ impl SceneGpu {
         }
         let draws = DrawTable::new(scene, &pieces)?;
         let bounds = draws.bounds();
-        let blended =
-            Blended::new(scene, &indices, &draws.data[draws.infos.len()..], draws.blended, draws.infos.len());
+        let blended = Blended::new(
+            scene,
+            &indices,
+            &draws.data[draws.infos.len()..],
+            &draws.blended,
+            draws.infos.len(),
+        );
+        let blended_triangles = blended::records(&blended, &draws.blended);
         let table = TextureTable::plan(scene, device.features(), &mut warnings)?;
         let (materials, transforms) = material_records(&scene.materials, &table);
 
@@ -114,6 +122,8 @@ impl SceneGpu {
         let uint4 = vk::Format::R32G32B32A32_UINT;
         let draw_data = record_image(device, &mut uploader, "scene draw records", &draws.data, 4, uint4)?;
         let draw_bounds = record_image(device, &mut uploader, "scene draw bounds", &bounds, 2, uint4)?;
+        let blended_triangles =
+            upload_slice(device, &mut uploader, "scene blended triangles", &blended_triangles)?;
         let materials = record_image(device, &mut uploader, "scene materials", &materials, 8, uint4)?;
         let uv_transforms = upload_slice(device, &mut uploader, "scene texture transforms", &transforms)?;
         let deformed = DeformedGpu::upload(device, &mut uploader, scene, rest_bounds_os)?;
@@ -129,7 +139,7 @@ impl SceneGpu {
             ("HAS_VERTEX_COLOR", u32::from(scene.attributes.iter().any(|a| a.color_rgba8 != u32::MAX))),
             ("HAS_UV_TRANSFORM", u32::from(!transforms.is_empty())),
         ];
-        let buffers = [&positions, &attributes, &indices, &draw_buffer, &uv_transforms];
+        let buffers = [&positions, &attributes, &indices, &draw_buffer, &uv_transforms, &blended_triangles];
         let images = [&draw_data, &draw_bounds, &materials].map(gpu::Image::allocated_bytes);
         let shapes = deformed.as_ref().map_or(0, DeformedGpu::bytes);
         Ok(Arc::new(Self {
@@ -145,12 +155,13 @@ impl SceneGpu {
             triangle_count: draws.infos.iter().map(|d| u64::from(d.index_count / 3)).sum(),
             vertex_count: scene.positions_os.len() as u64,
             draw_sources: draws.sources,
-            rest: Placed::new(draws.data, draws.infos, blended, PosedShapes::new(&scene.shaped)),
+            rest: Placed::new(draws.data, draws.infos, blended, PosedShapes::new(&scene.shaped), bounds),
             deformed,
             bucket_first: draws.bucket_first,
             draws: draw_buffer,
             draw_data,
             draw_bounds,
+            blended_triangles,
             positions,
             attributes,
             indices,

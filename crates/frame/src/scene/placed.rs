@@ -1,7 +1,7 @@
 //! Where the surfaces of a scene stand: what of them changes when nodes move.
 
 use afterlight_scene::Aabb;
-use afterlight_shader::structs::{DRAW_MIRRORED, DrawData};
+use afterlight_shader::structs::{DRAW_MIRRORED, DrawBounds, DrawData};
 use glam::Affine3A;
 
 use crate::scene::{DrawInfo, blended::Blended, deformed::PosedShapes, draw_list::displaced};
@@ -26,6 +26,8 @@ pub struct Placed {
     pub blended: Blended,
     /// Joints and weights that give deformed meshes their shapes.
     pub shapes: PosedShapes,
+    /// What the device chooses draws by, of all draws. Only shapes change it.
+    pub draw_bounds: Vec<DrawBounds>,
     /// Box of the draws in buckets, and of those with alpha blending: kept, since every frame asks and scenes have many draws.
     bounds_ws: [Aabb; 2],
 }
@@ -44,9 +46,10 @@ impl Placed {
         infos: Vec<DrawInfo>,
         blended: Blended,
         shapes: PosedShapes,
+        draw_bounds: Vec<DrawBounds>,
     ) -> Self {
         let bounds_ws = find_bounds(&infos, &blended);
-        Self { records, infos, blended, shapes, bounds_ws }
+        Self { records, infos, blended, shapes, draw_bounds, bounds_ws }
     }
 
     /// Box of all surfaces without alpha blending in world space, which displacement moves along each axis at most as far as said, m.
@@ -84,7 +87,12 @@ impl Placed {
                 continue;
             }
             [record.object_row0, record.object_row1, record.object_row2] = rows;
-            let bounds_ws = reshaped.map_or(source.bounds_os, |at| deformed[at].1).transformed(m);
+            let bounds_os = reshaped.map_or(source.bounds_os, |at| deformed[at].1);
+            if reshaped.is_some() {
+                let of_draw = &mut self.draw_bounds[i];
+                (of_draw.min_os, of_draw.max_os) = (bounds_os.min.into(), bounds_os.max.into());
+            }
+            let bounds_ws = bounds_os.transformed(m);
             match i.checked_sub(in_buckets) {
                 None => self.infos[i].bounds_ws = bounds_ws,
                 Some(place) => self.blended.place(place, record, bounds_ws),

@@ -1,11 +1,8 @@
-//! Surfaces with alpha blending, over the opaque image of any technique: sorted back to front on the CPU, shaded forward.
+//! Surfaces with alpha blending, over the opaque image of any technique: sorted back to front, shaded forward.
 //! See the README of this folder.
 
-use std::sync::Arc;
-
 use afterlight_graph::{
-    Blend, BlendEquation, BufferHandle, BufferRole, DepthTest, DrawCall, Graph, ImageHandle, Load, PassRole,
-    RasterPass, gpu::vk,
+    Blend, BlendEquation, BufferRole, DepthTest, Graph, ImageHandle, Load, PassRole, RasterPass, gpu::vk,
 };
 
 use crate::{
@@ -13,103 +10,21 @@ use crate::{
     surfaces::{geometry::SceneDraws, shade},
 };
 use afterlight_frame::{
-    ChangesWith, Frame, OpaqueDepth, SceneGpu, Settings, TechniqueError, Transparency, View, VisitsAllLights,
-    put,
-    scene::blended::{Ordered, ViewOrder},
-    scene::{Bucket, draw_list::COMMAND_BYTES},
+    Frame, OpaqueDepth, SceneGpu, Settings, TechniqueError, Transparency, VisitsAllLights, scene::Bucket,
     views,
 };
 
-/// Triangles that are sorted at most; where the scene has more, draws are.
-pub const SORTED_TRIANGLES_MAX: usize = 100_000;
+mod device;
+mod list;
+
+pub use list::BlendedList;
+use list::OrderedTriangles;
 
 /// Whether a frame of those settings shows surfaces with alpha blending: debug views are of what the technique did.
 fn is_drawn(settings: &Settings, scene: &SceneGpu) -> bool {
     settings.effects.transparency.order == Transparency::Sorted
         && settings.view == views::FINAL
         && scene.rest.blended.triangle_count() > 0
-}
-
-/// Why the order is coarser than was asked for.
-pub fn warning(settings: &Settings, scene: &SceneGpu) -> Option<String> {
-    let found = scene.rest.blended.triangle_count();
-    (is_drawn(settings, scene) && found > SORTED_TRIANGLES_MAX).then(|| {
-        format!(
-            "{found} triangles with alpha blending, expected at most {SORTED_TRIANGLES_MAX}: their {} draws are sorted, not they",
-            scene.rest.blended.draw_count()
-        )
-    })
-}
-
-/// The triangles with alpha blending that a view needs, or all that there are where views change.
-pub struct BlendedList {
-    index_count: usize,
-    command_count: usize,
-    /// Draws in view.
-    pub draw_count: u32,
-    /// Whether draws outside of the view are left out.
-    cull: bool,
-    /// The order of the only view; `None` where views change.
-    order: Option<Arc<Ordered>>,
-}
-
-impl BlendedList {
-    /// Those of a view; `None` where there are none in it, or the settings ask for none. If the frame `moves`, there is room for every
-    /// triangle of the scene.
-    pub fn of_view(view: &View<'_>, cull: bool, moves: bool) -> Option<Self> {
-        if !is_drawn(view.settings, view.scene) {
-            return None;
-        }
-        let found = ordered(view, cull);
-        let draw_count = found.draw_count;
-        if moves {
-            let triangles = view.placed.blended.triangle_count();
-            // A run of triangles of one draw is a command.
-            let runs =
-                if triangles > SORTED_TRIANGLES_MAX { view.placed.blended.draw_count() } else { triangles };
-            let index_count = 3 * triangles;
-            return Some(Self { index_count, command_count: runs, draw_count, cull, order: None });
-        }
-        let (index_count, command_count) = (found.indices.len(), found.commands.len());
-        let order = Some(Arc::new(found));
-        (command_count > 0).then_some(Self { index_count, command_count, draw_count, cull, order })
-    }
-
-    /// Where the commands begin, and their count, in the one buffer that holds indices, commands and count, bytes.
-    fn offsets(&self) -> [u64; 2] {
-        let commands = 4 * self.index_count as u64;
-        [commands, commands + COMMAND_BYTES * self.command_count as u64]
-    }
-
-    /// The buffer, filled for each view.
-    fn declare(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<BufferHandle, TechniqueError> {
-        let usage = vk::BufferUsageFlags::INDEX_BUFFER | vk::BufferUsageFlags::INDIRECT_BUFFER;
-        let ([commands_at, count_at], cull, order) = (self.offsets(), self.cull, self.order.clone());
-        let how = (count_at + 4, usage, ChangesWith::Camera);
-        frame.input(graph, ("blended triangles", BufferRole::Scene), how, move |view, bytes| {
-            let of_view;
-            let Ordered { indices, commands, .. } = match &order {
-                Some(order) => &**order,
-                None => {
-                    of_view = ordered(view, cull);
-                    &of_view
-                }
-            };
-            put(bytes, 0, indices);
-            put(bytes, commands_at as usize, commands);
-            put(bytes, count_at as usize, &[commands.len() as u32]);
-        })
-    }
-}
-
-/// Sorts the triangles for a view.
-fn ordered(view: &View<'_>, cull: bool) -> Ordered {
-    view.placed.blended.order(&ViewOrder {
-        cull: cull.then_some(view.camera.clip_from_world),
-        distance_from_world: view.camera.distance_from_world(),
-        displacement_m: view.displacement_m(),
-        triangles_max: SORTED_TRIANGLES_MAX,
-    })
 }
 
 /// Declares the passes that draw blended surfaces over the opaque radiance `hdr` of a technique; returns its next version. Where the board
@@ -133,12 +48,7 @@ pub fn draw(
             (PassRole::Transparency, BufferRole::Transparency),
         )?,
     };
-    let drawn = BlendedDraws {
-        lights,
-        triangles: list.declare(graph, frame)?,
-        offsets: list.offsets(),
-        max: list.command_count as u32,
-    };
+    let drawn = BlendedDraws { lights, triangles: list.declare(graph, frame)? };
     if frame.samples == 1 {
         let mut pass = graph.raster("shared/transparent", PassRole::Transparency);
         frame.bind_scene(&mut pass);
@@ -192,11 +102,7 @@ fn opaque_depth(graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, Tec
 /// A sorted list as the graph knows it, and how its surfaces find their lights.
 struct BlendedDraws {
     lights: LightStep,
-    /// Indices, then commands, then their count.
-    triangles: BufferHandle,
-    /// Where commands and count begin, bytes.
-    offsets: [u64; 2],
-    max: u32,
+    triangles: OrderedTriangles,
 }
 
 impl BlendedDraws {
@@ -207,17 +113,8 @@ impl BlendedDraws {
         let mut surfaces = SceneDraws::shaded(frame, shader, shader)?.depth(NEARER).blend(vec![blend]);
         surfaces.constants = self.lights.constants();
         self.lights.bind(frame, pass);
-        // With a count on the device, as all draws of a frame: after such calls, one without drew nothing on lavapipe.
-        let call = DrawCall::IndexedIndirectCount {
-            buffer: &self.triangles,
-            offset: self.offsets[0],
-            count_buffer: &self.triangles,
-            count_offset: self.offsets[1],
-            max: self.max,
-            stride: COMMAND_BYTES as u32,
-        };
-        let draw = surfaces.bucket_draw(frame, Bucket::DOUBLE_SIDED, call);
-        pass.draw(draw.index_buffer(&self.triangles, vk::IndexType::UINT32));
+        let draw = surfaces.bucket_draw(frame, Bucket::DOUBLE_SIDED, self.triangles.call());
+        pass.draw(draw.index_buffer(&self.triangles.indices, vk::IndexType::UINT32));
         Ok(())
     }
 }

@@ -1,19 +1,16 @@
-// How the draws of a scene stand in batches: 1,024 neighbouring draws of one bucket, the work of a group of 256 threads. A bucket has one batch
+// How the draws of a scene stand in batches: neighbouring draws of one bucket, the work of a group of 256 threads. A bucket has one batch
 // at least, so that some group writes its count.
 //
-// CPU twin: batches in crates/stages/src/shared/cull/mod.rs.
+// CPU twin: Batches in crates/stages/src/shared/cull/mod.rs.
 #ifndef AFTERLIGHT_CULL_BATCHES
 #define AFTERLIGHT_CULL_BATCHES
 
 const uint BUCKETS = 8u;            // BUCKETS of crates/frame/src/scene/draws.rs
-const uint BINS = 256u;             // BINS of crates/frame/src/scene/draw_list.rs: one for each thread of a group
-const uint NO_BIN = 0xffffffffu;    // of a draw that is left out
 const uint THREADS = 256u;
-const uint ROUNDS = 4u;             // draws of a thread
-const uint BATCH_DRAWS = THREADS * ROUNDS;  // BATCH_DRAWS of mod.rs
 
 layout(push_constant, scalar) uniform Push {
     uint bucket_first[BUCKETS + 1u];    // first draw of each bucket, and the end
+    uint rounds;                        // draws of a thread
 };
 
 struct Batch {
@@ -28,16 +25,16 @@ struct Batch {
 // The batch of this group.
 Batch own_batch() {
     Batch batch = Batch(0u, gl_WorkGroupID.x, 0u, 0u, 0u, 0u);
-    uint first_batch = 0u;
+    uint first_batch = 0u, batch_draws = THREADS * rounds;
     for (uint bucket = 0u; bucket < BUCKETS; ++bucket) {
         uint first = bucket_first[bucket], end = bucket_first[bucket + 1u];
-        uint batches = max((end - first + BATCH_DRAWS - 1u) / BATCH_DRAWS, 1u);
+        uint batches = max((end - first + batch_draws - 1u) / batch_draws, 1u);
         if (batch.number >= first_batch && batch.number < first_batch + batches) {
             batch.bucket = bucket;
             batch.first_of_bucket = first_batch;
             batch.end_of_bucket = first_batch + batches;
-            batch.first_draw = first + (batch.number - first_batch) * BATCH_DRAWS;
-            batch.end_draw = min(batch.first_draw + BATCH_DRAWS, end);
+            batch.first_draw = first + (batch.number - first_batch) * batch_draws;
+            batch.end_draw = min(batch.first_draw + batch_draws, end);
         }
         first_batch += batches;
     }

@@ -10,6 +10,8 @@
 
 const uint ORDER_CENTER = 1u;
 const uint ORDER_NEAR = 2u;
+const uint BINS = 256u;             // BINS of crates/frame/src/scene/draw_list.rs: one for each thread of a group
+const uint NO_BIN = 0xffffffffu;    // of a draw that is left out
 const uint STEP_SHIFT = 20u;        // STEP_SHIFT of draw_list.rs
 
 struct DrawChoiceConstants {
@@ -66,11 +68,25 @@ Bounds transformed_bounds(Bounds b, DrawData draw) {
     return moved;
 }
 
+Bounds displaced(Bounds b, float displacement_m) {
+    precise vec3 low = b.low - displacement_m, high = b.high + displacement_m;
+    return Bounds(low, high);
+}
+
 bool reaches(vec4 plane, Bounds b) {
     vec3 farthest = mix(b.low, b.high, greaterThanEqual(plane.xyz, vec3(0.0)));
     precise float signed_distance = dot_in_order(plane.xyz, farthest) + plane.w;
     // What is no number is kept.
     return !(signed_distance < 0.0);
+}
+
+// Whether displaced bounds reach all half-spaces.
+bool is_in_view(DrawChoiceConstants c, Bounds reached) {
+    bool reaches_all = true;
+    for (uint i = 0u; i < 8u; ++i) {
+        reaches_all = reaches_all && reaches(c.planes[i], reached);
+    }
+    return reaches_all;
 }
 
 bool is_small(DrawChoiceConstants c, Bounds b) {
@@ -101,13 +117,8 @@ float order_distance_sq(DrawChoiceConstants c, Bounds b) {
 
 // The bin of a draw with those bounds, 0 the nearest; NO_BIN where it is left out.
 uint bin_of(DrawChoiceConstants c, Bounds b) {
-    precise vec3 low = b.low - c.displacement_m, high = b.high + c.displacement_m;
-    Bounds reached = Bounds(low, high);
-    bool is_needed = !is_small(c, reached);
-    for (uint i = 0u; i < 8u; ++i) {
-        is_needed = is_needed && reaches(c.planes[i], reached);
-    }
-    if (!is_needed) {
+    Bounds reached = displaced(b, c.displacement_m);
+    if (is_small(c, reached) || !is_in_view(c, reached)) {
         return NO_BIN;
     }
     if (c.order != ORDER_CENTER && c.order != ORDER_NEAR) {

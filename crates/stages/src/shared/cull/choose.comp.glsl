@@ -28,7 +28,7 @@ void main() {
     Batch batch = own_batch();
     counts[thread] = 0u;
     barrier();
-    for (uint round = 0u; round < ROUNDS; ++round) {
+    for (uint round = 0u; round < rounds; ++round) {
         uint draw = batch.first_draw + round * THREADS + thread;
         if (draw < batch.end_draw) {
             uint index_count;

@@ -4,12 +4,12 @@
 use std::{borrow::Cow, ops::Range};
 
 use afterlight_frame::{
-    ChangesWith, CullOn, DrawCommands, DrawParams, Frame, SceneGpu, TechniqueError, View, ViewInputs, put,
+    ChangesWith, CullOn, DrawCommands, DrawParams, Frame, SceneGpu, TechniqueError, View, ViewInputs,
+    find_shader, put,
     scene::{
         BUCKETS,
         draw_list::{BINS, COMMAND_BYTES, DrawQuery, DrawsInOrder},
     },
-    find_shader,
 };
 use afterlight_graph::{
     BufferHandle, BufferRole, Graph, ImageHandle, PassRole,
@@ -17,8 +17,12 @@ use afterlight_graph::{
 };
 use afterlight_shader::{Shader, structs::DrawChoiceConstants};
 
-/// Draws of a group: `BATCH_DRAWS` in `batches.glsl`.
-const BATCH_DRAWS: u32 = 1024;
+/// Threads of a group: `THREADS` in `batches.glsl`.
+const THREADS: u32 = 256;
+/// Draws of a thread at least.
+const ROUNDS_MIN: u32 = 4;
+/// Batches of a bucket at most: each group of `order` reads the counts of all of them.
+const BATCHES_MAX: u32 = 256;
 
 /// What draws are chosen from.
 #[derive(Clone, Copy)]
@@ -59,9 +63,9 @@ impl<'a> SceneOfDraws<'a> {
     /// A shader that is not compiled in, the device, a buffer that one binding does not reach.
     pub fn in_view(&self, graph: &mut Graph) -> Result<DrawCommands, TechniqueError> {
         let named = ("shared/draw", ChangesWith::Camera);
-        match self.cull_on {
-            CullOn::Gpu => self.on_device(graph, named, |view| view.query(None)),
-            CullOn::Cpu => self.on_host(graph, named, |view| Cow::Borrowed(view.visible())),
+        match self.is_on_device() {
+            true => self.on_device(graph, named, |view| view.query(None)),
+            false => self.on_host(graph, named, |view| Cow::Borrowed(view.visible())),
         }
     }
 
@@ -75,12 +79,16 @@ impl<'a> SceneOfDraws<'a> {
         named: (&str, ChangesWith),
         query: impl Fn(&View<'_>) -> DrawQuery + Clone + Send + Sync + 'static,
     ) -> Result<DrawCommands, TechniqueError> {
-        match self.cull_on {
-            CullOn::Gpu => self.on_device(graph, named, query),
-            CullOn::Cpu => self.on_host(graph, named, move |view| {
+        match self.is_on_device() {
+            true => self.on_device(graph, named, query),
+            false => self.on_host(graph, named, move |view| {
                 Cow::Owned(query(view).choose(&view.scene.bucket_first, &view.placed.infos))
             }),
         }
+    }
+
+    fn is_on_device(&self) -> bool {
+        self.cull_on.chooses_on_device(self.scene.draw_count())
     }
 
     fn on_host(
@@ -110,19 +118,19 @@ impl<'a> SceneOfDraws<'a> {
 
     /// Declares the pass that finds the bin of every draw.
     fn choose(&self, graph: &mut Graph, name: &str, choice: &BufferHandle) -> Result<Bins, TechniqueError> {
-        let (draws, batches) = (self.scene.draw_count().max(1) as u64, batches(&self.scene.bucket_first));
+        let (draws, batches) = (self.scene.draw_count().max(1) as u64, Batches::of(self.scene.bucket_first));
         let of_draws = graph.buffer(&format!("{name} bins"), BufferRole::Shared, 4 * draws);
-        let bytes = 4 * u64::from(BINS) * u64::from(batches);
+        let bytes = 4 * u64::from(BINS) * u64::from(batches.count());
         let counts = graph.buffer(&format!("{name} bin counts"), BufferRole::Shared, bytes);
         let shader = find_shader(self.shaders, "shared/cull/choose.comp")?;
         let mut pass = graph.compute(&format!("{name} choose"), PassRole::Culling, &shader);
-        pass.push(&self.scene.bucket_first);
+        pass.push(&batches.push());
         pass.read("CullBlock", choice)
             .read("draw_bounds", self.draw_bounds)
             .read("draw_data", self.draw_data);
         let of_draws = pass.write("DrawBins", of_draws);
         let counts = pass.write("BinCounts", counts);
-        pass.dispatch([batches, 1, 1]);
+        pass.dispatch([batches.count(), 1, 1]);
         pass.finish();
         Ok(Bins { of_draws, counts })
     }
@@ -134,12 +142,13 @@ impl<'a> SceneOfDraws<'a> {
         let counts = graph.buffer(&format!("{name} counts"), BufferRole::Scene, 4 * BUCKETS as u64);
         let shader = find_shader(self.shaders, "shared/cull/order.comp")?;
         let mut pass = graph.compute(&format!("{name} order"), PassRole::Culling, &shader);
-        pass.push(&first);
+        let batches = Batches::of(first);
+        pass.push(&batches.push());
         pass.read("DrawBins", &bins.of_draws).read("BinCounts", &bins.counts);
         pass.read("draw_bounds", self.draw_bounds).read("draw_data", self.draw_data);
         let commands = pass.write("DrawCommands", commands);
         let counts = pass.write("DrawCounts", counts);
-        pass.dispatch([batches(&first), 1, 1]);
+        pass.dispatch([batches.count(), 1, 1]);
         pass.finish();
         Ok(DrawCommands { commands, counts, first })
     }
@@ -167,7 +176,28 @@ struct Bins {
     counts: BufferHandle,
 }
 
-/// Groups of draws of one bucket; a bucket has one at least.
-fn batches(bucket_first: &[u32; BUCKETS + 1]) -> u32 {
-    bucket_first.windows(2).map(|ends| (ends[1] - ends[0]).div_ceil(BATCH_DRAWS).max(1)).sum()
+/// How draws are cut into batches, the work of a group each: neighbouring draws of one bucket.
+#[derive(Clone, Copy)]
+struct Batches {
+    bucket_first: [u32; BUCKETS + 1],
+    /// Draws of a thread.
+    rounds: u32,
+}
+
+impl Batches {
+    fn of(bucket_first: [u32; BUCKETS + 1]) -> Self {
+        let rounds = bucket_first[BUCKETS].div_ceil(THREADS * BATCHES_MAX).max(ROUNDS_MIN);
+        Self { bucket_first, rounds }
+    }
+
+    /// Number of batches; a bucket has one at least.
+    fn count(&self) -> u32 {
+        let in_bucket = |ends: &[u32]| (ends[1] - ends[0]).div_ceil(THREADS * self.rounds).max(1);
+        self.bucket_first.windows(2).map(in_bucket).sum()
+    }
+
+    /// What the shaders are told.
+    fn push(&self) -> [u32; BUCKETS + 2] {
+        std::array::from_fn(|i| if i <= BUCKETS { self.bucket_first[i] } else { self.rounds })
+    }
 }

@@ -74,7 +74,7 @@ void main() {
         marks[thread * WORDS + word] = 0u;
     }
     barrier();
-    for (uint round = 0u; round < ROUNDS; ++round) {
+    for (uint round = 0u; round < rounds; ++round) {
         uint draw = batch.first_draw + round * THREADS + thread;
         uint bin = draw < batch.end_draw ? draw_bins[draw] : NO_BIN;
         if (bin != NO_BIN) {
