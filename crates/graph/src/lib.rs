@@ -38,11 +38,12 @@ pub use afterlight_roles::{BufferRole, PassRole, PassWork};
 
 pub use declare::{
     Blend, BlendEquation, BufferHandle, Commands, ComputePass, ConstantBits, DepthTest, Draw, DrawCall,
-    Graph, Handle, ImageHandle, ImageInfo, Load, RasterPass, RasterState, Rect, ResourceId, ScriptId,
-    StencilFace, StencilTest, Step, Subresource, VertexAttribute, VertexLayout, VertexStream,
+    Graph, Handle, History, ImageHandle, ImageInfo, Load, RasterPass, RasterState, Rect, ResourceId,
+    ScriptId, StencilFace, StencilTest, Step, Subresource, Version, VertexAttribute, VertexLayout,
+    VertexStream,
 };
 pub use error::GraphError;
-pub use execute::{Executor, FrameInput, FrameSlot, FrameTimes, ResourceKey};
+pub use execute::{Executor, FrameInput, FrameSlot, FrameTimes, ResourceKey, Turn};
 pub use plan::{
     Access, Barrier, MemoryNeed, Placement, Plan, PlannedHeap, PlannedPass, PlannedResource, Requirements,
     Traffic,
