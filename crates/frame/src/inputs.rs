@@ -13,7 +13,7 @@ use afterlight_graph::{
 use afterlight_scene::Aabb;
 
 use crate::{
-    CameraView, DrawCommands, Frame, SceneGpu, SceneLights, Settings, TechniqueError,
+    CameraView, DrawCommands, Frame, FrameTime, SceneGpu, SceneLights, Settings, TechniqueError,
     scene::{
         BUCKETS,
         draw_list::{COMMAND_BYTES, write_commands, write_counts},
@@ -36,6 +36,8 @@ pub struct View<'a> {
     pub visible: &'a [Vec<u32>; BUCKETS],
     /// Where surfaces stand.
     pub placed: &'a Placed,
+    /// When it is, and what the frame before showed.
+    pub time: &'a FrameTime,
 }
 
 impl View<'_> {
@@ -56,7 +58,7 @@ type Fill = dyn Fn(&View<'_>, &mut [u8]) + Send + Sync;
 /// What an input changes with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ChangesWith {
-    /// The camera, and where surfaces stand.
+    /// The camera, where surfaces stand, and what the frame before showed.
     Camera,
     /// Where surfaces stand, alone.
     Pose,
@@ -101,6 +103,7 @@ pub struct ViewInputs {
     inputs: RefCell<Vec<ViewInput>>,
     scripts: RefCell<Vec<ViewScript>>,
     holds_for_one_view: Cell<bool>,
+    asks_for_records_before: Cell<bool>,
 }
 
 impl ViewInputs {
@@ -147,11 +150,35 @@ impl ViewInputs {
         let stream =
             self.declare(device, graph, named, how, |view, bytes| put(bytes, 0, &view.placed.records))?;
         // A record of four texels is as long as in the stream.
-        let named = ("scene draw records", BufferRole::Scene);
+        let named = (("scene draw records", BufferRole::Scene), ChangesWith::Pose);
         let records = self.declare_like(device, graph, named, &scene.draw_data, |view, bytes| {
             put(bytes, 0, &view.placed.records);
         })?;
         Ok((stream, records))
+    }
+
+    /// Where the draws of a scene stood in the frame before, as an image of records, for each frame of a scene that moves.
+    ///
+    /// # Errors
+    /// The device.
+    pub fn declare_records_before(
+        &self,
+        device: &gpu::Device,
+        graph: &mut Graph,
+        scene: &SceneGpu,
+    ) -> Result<ImageHandle, TechniqueError> {
+        self.asks_for_records_before.set(true);
+        let named = ("scene draw records before", BufferRole::Scene);
+        let how = (named, ChangesWith::Camera);
+        self.declare_like(device, graph, how, &scene.draw_data, |view, bytes| {
+            let before = view.time.before.as_ref().and_then(|before| before.records.as_deref());
+            put(bytes, 0, before.unwrap_or(&view.placed.records));
+        })
+    }
+
+    /// Whether some input holds where draws stood in the frame before.
+    pub fn asks_for_records_before(&self) -> bool {
+        self.asks_for_records_before.get()
     }
 
     /// Records and spheres of lights, for each pose.
@@ -164,22 +191,22 @@ impl ViewInputs {
         graph: &mut Graph,
         lights: &SceneLights,
     ) -> Result<(ImageHandle, ImageHandle), TechniqueError> {
-        let named = ("lights", BufferRole::Lights);
+        let named = (("lights", BufferRole::Lights), ChangesWith::Pose);
         let data = self
             .declare_like(device, graph, named, &lights.data, |view, bytes| view.lights.fill_data(bytes))?;
-        let named = ("light spheres", BufferRole::Lights);
+        let named = (("light spheres", BufferRole::Lights), ChangesWith::Pose);
         let spheres = self.declare_like(device, graph, named, &lights.spheres, |view, bytes| {
             view.lights.fill_spheres(bytes)
         })?;
         Ok((data, spheres))
     }
 
-    /// An image of records like another one, filled for each pose.
+    /// An image of records like another one.
     fn declare_like(
         &self,
         device: &gpu::Device,
         graph: &mut Graph,
-        (name, role): (&str, BufferRole),
+        ((name, role), changes_with): ((&str, BufferRole), ChangesWith),
         like: &gpu::Image,
         fill: impl Fn(&View<'_>, &mut [u8]) + Send + Sync + 'static,
     ) -> Result<ImageHandle, TechniqueError> {
@@ -196,11 +223,7 @@ impl ViewInputs {
         })?;
         let handle = graph.import_image(name, role, &image, vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL);
         let target = FrameInput::Image(image);
-        self.inputs.borrow_mut().push(ViewInput {
-            target,
-            changes_with: ChangesWith::Pose,
-            fill: Box::new(fill),
-        });
+        self.inputs.borrow_mut().push(ViewInput { target, changes_with, fill: Box::new(fill) });
         Ok(handle)
     }
 

@@ -9,13 +9,17 @@ use std::{
     time::{Duration, Instant},
 };
 
-use afterlight_graph::{FrameSlot, FrameTimes, ResourceId, gpu};
+use afterlight_graph::{Executor, FrameSlot, FrameTimes, ResourceId, Turn, gpu};
 use afterlight_scene::{Aabb, Camera, InstanceHandle, Light, LightHandle, Pose, Scene, ShapePose};
 use glam::Affine3A;
 
-use crate::{Prepared, Renderer, renderer::Recipe};
+use crate::{
+    Prepared, Renderer,
+    chain::{Chain, Link},
+    renderer::Recipe,
+};
 use afterlight_frame::{
-    ChangesWith, Params, Settings, Technique, TechniqueError,
+    ChangesWith, FrameTime, Params, Settings, Technique, TechniqueError, ViewBefore,
     capacity::{Capacities, Counter, Demand},
     completed,
 };
@@ -56,6 +60,10 @@ impl Default for FlightOptions {
 pub struct FrameContext {
     /// Number of the frame.
     pub index: u64,
+    /// Time of the scene, s.
+    pub time_s: f64,
+    /// Whether the camera has jumped: nothing of the frame before is of use. The first frame of a flight is one of its own.
+    pub cut: bool,
     /// The camera.
     pub camera: Camera,
     /// Where surfaces and lights of the scene are; `None` is where they were uploaded.
@@ -153,14 +161,23 @@ struct Place {
     flying: Option<Flying>,
 }
 
-struct Flying {
+/// A frame with what the one before it showed: what a frame that is drawn again is given once more.
+#[derive(Clone)]
+struct Showing {
     context: FrameContext,
+    /// Its number in the order in which frames were sent.
+    sent: u64,
+    before: Option<Arc<ViewBefore>>,
+}
+
+struct Flying {
+    frame: Showing,
     cpu: Duration,
     events: Vec<Event>,
 }
 
 /// What sends a frame on its way.
-type Sending<'a> = dyn FnMut(&mut Place, &Prepared) -> Result<(), TechniqueError> + 'a;
+type Sending<'a> = dyn FnMut(&mut Place, &Prepared, Turn) -> Result<(), TechniqueError> + 'a;
 
 /// A technique that draws frame after frame.
 pub struct Flight<'r> {
@@ -173,7 +190,13 @@ pub struct Flight<'r> {
     plan: u64,
     demands: Arc<[Demand]>,
     /// What the last frame that was sent on its way shows.
-    shown: Option<FrameContext>,
+    shown: Option<Showing>,
+    /// Frames that were sent on their way.
+    sent: u64,
+    /// What the last of them showed.
+    before: Option<Arc<ViewBefore>>,
+    /// Who wrote the history of the plan's resources.
+    chain: Chain,
     /// In the order of their frames, the oldest first.
     places: VecDeque<Place>,
     /// Whether frames go into another program's command buffers; none of them is submitted or waited for.
@@ -215,6 +238,9 @@ impl Renderer {
             demands: prepared.demands.clone().into(),
             prepared,
             shown: None,
+            sent: 0,
+            before: None,
+            chain: Chain::default(),
             places: VecDeque::new(),
             for_callers,
         };
@@ -239,7 +265,7 @@ impl Flight<'_> {
         done: &mut dyn FnMut(&Done<'_>) -> Result<(), TechniqueError>,
     ) -> Result<(), TechniqueError> {
         self.hand_on(self.options.in_flight.max(1) as usize - 1, done)?;
-        self.send(context, &mut |place, _| Ok(place.slot.submit()?))
+        self.send(context, &mut |place, _, turn| Ok(place.slot.submit(turn)?))
     }
 
     /// Adds a frame to another program's command buffer, and a copy of its picture to its image.
@@ -251,23 +277,30 @@ impl Flight<'_> {
     ) -> Result<(), TechniqueError> {
         // A frame that cannot be shown is not begun.
         self.renderer.device().check_target(target)?;
-        self.send(context, &mut |place, prepared| {
-            Ok(place.slot.execute_in(&prepared.executor, prepared.kept.final_color, commands, target)?)
+        self.send(context, &mut |place, prepared, turn| {
+            let picture = (prepared.kept.final_color, turn);
+            Ok(place.slot.execute_in(&prepared.executor, picture, commands, target)?)
         })
     }
 
     fn send(&mut self, context: FrameContext, how: &mut Sending<'_>) -> Result<(), TechniqueError> {
         let start = Instant::now();
         let mut events = Vec::new();
-        self.show(&context)?;
+        let before = self.before.clone().filter(|_| !context.cut);
+        let frame = Showing { context, sent: self.sent, before };
+        self.show(&frame)?;
         if !self.prepared.shows_all_views {
-            self.plan_anew(&context.camera, self.prepared.capacities.again())?;
+            self.plan_anew(&frame.context.camera, self.prepared.capacities.again())?;
             events.push(Event::Planned);
         }
-        let mut place = self.fill_place()?;
-        how(&mut place, &self.prepared)?;
-        self.shown = Some(context.clone());
-        let flying = Flying { context, cpu: start.elapsed(), events };
+        let (mut place, link) = self.fill_place(&frame)?;
+        how(&mut place, &self.prepared, link.turn)?;
+        self.chain.append(link);
+        self.sent += 1;
+        let with_records = self.prepared.asks_for_records_before;
+        self.before = Some(Arc::new(self.prepared.viewed.as_before(with_records)));
+        self.shown = Some(frame.clone());
+        let flying = Flying { frame, cpu: start.elapsed(), events };
         self.places.push_back(Place { flying: Some(flying), ..place });
         Ok(())
     }
@@ -279,7 +312,7 @@ impl Flight<'_> {
         done: &mut dyn FnMut(&Done<'_>) -> Result<(), TechniqueError>,
     ) -> Result<(), TechniqueError> {
         for place in &mut self.places {
-            if place.flying.as_ref().is_some_and(|flying| flying.context.index <= index) {
+            if place.flying.as_ref().is_some_and(|flying| flying.frame.context.index <= index) {
                 place.slot.release_from_caller();
             }
         }
@@ -323,25 +356,35 @@ impl Flight<'_> {
         self.prepared.executor.plan().passes.iter().map(|pass| pass.name.clone()).collect()
     }
 
+    /// The executor of the current plan, for memory figures and for what was kept of the last frame.
+    pub fn executor(&self) -> &Executor {
+        &self.prepared.executor
+    }
+
     /// Looks at what a frame shows.
-    fn show(&mut self, context: &FrameContext) -> Result<(), TechniqueError> {
+    fn show(&mut self, frame: &Showing) -> Result<(), TechniqueError> {
+        let context = &frame.context;
         if context.pose.is_some() && !self.options.scene_moves {
             return Err(TechniqueError::SceneStandsStill);
         }
         self.prepared.viewed.place(context.pose.as_deref(), &self.renderer.settings().lights)?;
         self.prepared.viewed.look_through(&context.camera);
+        self.prepared.viewed.time = time_of(frame);
         Ok(())
     }
 
-    /// Submits a frame of the current view.
-    fn launch(&mut self) -> Result<Place, TechniqueError> {
-        let mut place = self.fill_place()?;
-        place.slot.submit()?;
+    /// Submits a frame, which is shown.
+    fn launch(&mut self, frame: &Showing) -> Result<Place, TechniqueError> {
+        let (mut place, link) = self.fill_place(frame)?;
+        place.slot.submit(link.turn)?;
+        self.chain.append(link);
         Ok(place)
     }
 
-    /// A place that nobody uses, with the inputs of the current view.
-    fn fill_place(&mut self) -> Result<Place, TechniqueError> {
+    /// A place that nobody uses, with the inputs of a frame, which is shown, and that frame's place in the chain.
+    fn fill_place(&mut self, frame: &Showing) -> Result<(Place, Link), TechniqueError> {
+        let link = self.chain.link(frame.sent);
+        self.prepared.viewed.time = FrameTime { has_history: link.has_history(), ..time_of(frame) };
         // A place whose frame was handed on stands at the front.
         let idle = self.places.iter().position(|place| place.flying.is_none() && place.plan == self.plan);
         let mut place = match idle.and_then(|idle| self.places.remove(idle)) {
@@ -354,7 +397,7 @@ impl Flight<'_> {
         };
         if !self.prepared.scripts.is_empty() {
             self.prepared.choose_draws();
-            self.prepared.executor.record_again(&mut place.slot)?;
+            self.prepared.executor.record_again(&mut place.slot, link.turn)?;
         }
         let view = self.prepared.viewed.view();
         let stands_still = place.pose == Some(self.prepared.viewed.pose);
@@ -364,7 +407,7 @@ impl Flight<'_> {
             }
         }
         place.pose = Some(self.prepared.viewed.pose);
-        Ok(place)
+        Ok((place, link))
     }
 
     /// A place of the current plan.
@@ -397,6 +440,7 @@ impl Flight<'_> {
         self.prepared = self.renderer.record(&recipe, &settings, moved, capacities, &|_, _| {})?;
         self.demands = self.prepared.demands.clone().into();
         self.plan += 1;
+        self.chain = Chain::default();
         Ok(())
     }
 
@@ -422,7 +466,7 @@ impl Flight<'_> {
             let picture = self.options.pictures.then_some(place.demands.len());
             let mut tell = |rgba8: Option<&[u8]>| {
                 done(&Done {
-                    index: flying.context.index,
+                    index: flying.frame.context.index,
                     times: &times,
                     cpu: flying.cpu,
                     events: &flying.events,
@@ -458,7 +502,7 @@ impl Flight<'_> {
             let can_draw_again = self.options.shortfall == Shortfall::DrawAgain && !self.for_callers;
             let is_drawn_again = fell_short && can_draw_again;
             if is_drawn_again {
-                self.show(&flying.context)?;
+                self.show(&flying.frame)?;
             }
             let camera = self.prepared.viewed.settings.camera.clone();
             // A frame before this one may have made room already.
@@ -472,7 +516,7 @@ impl Flight<'_> {
                 return Ok(fell_short);
             }
             flying.events.push(Event::DrawnAgain);
-            *place = self.launch()?;
+            *place = self.launch(&flying.frame)?;
             flying.cpu += start.elapsed();
             place.slot.wait()?;
             if let Some(now) = &now {
@@ -480,6 +524,12 @@ impl Flight<'_> {
             }
         }
     }
+}
+
+/// When a frame is, as long as it is not known whether it finds history.
+fn time_of(frame: &Showing) -> FrameTime {
+    let FrameContext { index, time_s, .. } = frame.context;
+    FrameTime { index, time_s, before: frame.before.clone(), has_history: false }
 }
 
 impl Place {

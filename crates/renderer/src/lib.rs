@@ -3,6 +3,7 @@
 //! The renderer knows stages, which compose every frame (shadows, indirect light, transparency, filters, the tone map), and no technique: it is
 //! given one as a `&dyn Technique`, which brings its own shaders.
 
+mod chain;
 mod embedded;
 mod flight;
 mod prepared;

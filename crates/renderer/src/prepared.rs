@@ -7,7 +7,7 @@ use afterlight_graph::{Executor, FrameInput, FrameReport, ResourceId, gpu};
 use afterlight_scene::{Camera, Light, ShapePose};
 
 use afterlight_frame::{
-    CameraView, DrawParams, LightPairs, SceneLights, Settings, TechniqueError, View, ViewInput, ViewInputs,
+    CameraView, DrawParams, FrameTime, LightPairs, SceneLights, Settings, TechniqueError, View, ViewBefore, ViewInput, ViewInputs,
     ViewScript,
     capacity::{Capacities, Counter, Demand},
     scene::{
@@ -55,6 +55,8 @@ pub(crate) struct Viewed {
     pub moved: Moved,
     /// Counts the poses so far.
     pub pose: u64,
+    /// When it is.
+    pub time: FrameTime,
 }
 
 impl Viewed {
@@ -67,8 +69,8 @@ impl Viewed {
         options: DrawParams,
     ) -> Self {
         let camera = CameraView::fitted(settings, moved.placed.as_deref().unwrap_or(&scene.rest));
-        let draws = DrawChoice::new(options);
-        let mut viewed = Self { settings: settings.clone(), camera, draws, moved, pose: 0, scene, lights };
+        let (draws, time) = (DrawChoice::new(options), FrameTime::default());
+        let mut viewed = Self { settings: settings.clone(), camera, draws, moved, pose: 0, time, scene, lights };
         viewed.choose_draws();
         viewed
     }
@@ -142,7 +144,14 @@ impl Viewed {
             lights: self.moved.lights.as_deref().unwrap_or(&self.lights),
             visible: &self.draws.visible,
             placed: self.placed(),
+            time: &self.time,
         }
+    }
+
+    /// What it shows, for the frame after it; with where draws stand if that frame asks.
+    pub fn as_before(&self, with_records: bool) -> ViewBefore {
+        let records = with_records.then(|| self.placed().records.clone());
+        ViewBefore { clip_from_world: self.camera.clip_from_world, records }
     }
 }
 
@@ -169,6 +178,8 @@ pub struct Prepared {
     pub(crate) capacities: Capacities,
     pub(crate) demands: Vec<Demand>,
     pub(crate) kept: Kept,
+    /// Whether frames ask where draws stood in the frame before.
+    pub(crate) asks_for_records_before: bool,
     /// Draws in view.
     pub draw_calls: u32,
 }
@@ -183,6 +194,7 @@ impl Prepared {
         kept: Kept,
         draw_calls: u32,
     ) -> Result<Self, TechniqueError> {
+        let asks_for_records_before = inputs.asks_for_records_before();
         let (inputs, scripts, shows_all_views) = inputs.into_parts();
         let demands = capacities.demands();
         let device = device.clone();
@@ -196,6 +208,7 @@ impl Prepared {
             capacities,
             demands,
             kept,
+            asks_for_records_before,
             draw_calls,
         };
         prepared.fill_inputs()?;

@@ -28,7 +28,7 @@ use afterlight_stages::{
     },
     lights::volumes,
     shared::{deform, indirect, shadow},
-    views::{light_pair_colors, of as technique_views},
+    views::{light_pair_colors, of as technique_views, velocity_colors},
 };
 
 /// Times that a view is recorded at most until everything that can overflow has room.
@@ -325,6 +325,7 @@ impl Renderer {
         let hdr_id = (settings.keep_hdr || counts_pairs).then(|| graph.keep(&hdr));
         let shown = match counts_pairs {
             true => light_pair_colors(&mut graph, &frame, &hdr)?,
+            false if frame.shows(views::VELOCITY) => velocity_colors(&mut graph, &frame)?,
             false => hdr,
         };
         let final_color =
@@ -359,7 +360,8 @@ impl Renderer {
             (size_of::<FrameConstants>() as u64, vk::BufferUsageFlags::UNIFORM_BUFFER, ChangesWith::Camera),
             |view, bytes| {
                 let bounds_ws = view.bounds_ws();
-                put(bytes, 0, &[view.camera.constants(view.settings, view.lights, &bounds_ws)]);
+                let of_view = view.camera.constants(view.settings, view.lights, &bounds_ws);
+                put(bytes, 0, &[view.time.constants(of_view)]);
             },
         )?;
         let draws = inputs.declare_draws(&self.device, graph, ("draw", ChangesWith::Camera), s, |view| {

@@ -137,6 +137,7 @@ fn draw(
     camera: &Camera,
 ) -> Result<u64, Error> {
     let mut shown = 0;
+    let start = Instant::now();
     for round in 0..options.frames {
         events.pump_app_events(Some(Duration::ZERO), app);
         if app.is_closed {
@@ -164,7 +165,7 @@ fn draw(
             (CallersCommands::new(commands), target)
         };
         view.frame(
-            FrameContext { index: shown, camera: camera.clone(), pose: None },
+            FrameContext { index: shown, time_s: start.elapsed().as_secs_f64(), cut: false, camera: camera.clone(), pose: None },
             &commands_of_view,
             &target,
         )?;

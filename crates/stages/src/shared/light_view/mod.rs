@@ -143,9 +143,9 @@ pub fn look_through<T>(
     declare: impl FnOnce(&mut Graph, &Frame<'_>) -> Result<T, TechniqueError>,
 ) -> Result<T, TechniqueError> {
     let constants = constants_of_pose(graph, frame, &format!("{pass} view"), move |view| {
-        through(view, size_px).map_or_else(FrameConstants::zeroed, |camera| FrameConstants {
-            samples: 1,
-            ..camera.constants(view.settings, view.lights, &view.bounds_ws())
+        through(view, size_px).map_or_else(FrameConstants::zeroed, |camera| {
+            let of_view = camera.constants(view.settings, view.lights, &view.bounds_ws());
+            FrameConstants { samples: 1, ..view.time.alone().constants(of_view) }
         })
     })?;
     let named = (&*format!("{pass} draw"), ChangesWith::Pose);
