@@ -56,11 +56,16 @@ struct Remembering {
 
 impl Remembering {
     fn new(device: &Device) -> Self {
+        Self::after(device, WIDTH, None)
+    }
+
+    /// With images of a width, after a frame that another plan has drawn.
+    fn after(device: &Device, width: u32, earlier: Option<&Executor>) -> Self {
         let usage = vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::TRANSFER_DST;
         let desc = BufferDesc { name: "number", bytes: 16, usage, memory: MemoryKind::DeviceLocal };
         let number = device.create_buffer(&desc).expect("a buffer");
         let mut g = Graph::new();
-        let info = ImageInfo::new(vk::Format::R32_UINT, WIDTH, HEIGHT);
+        let info = ImageInfo::new(vk::Format::R32_UINT, width, HEIGHT);
         let images = g.history_image("image", BufferRole::Targets, info);
         let counts = g.history_buffer("count", BufferRole::Counters, 4);
         let seen = g.buffer("seen", BufferRole::Counters, 4 * u64::from(WIDTH * HEIGHT + 1));
@@ -76,7 +81,7 @@ impl Remembering {
         let (seen, left) = (g.keep(&seen), g.keep(&image));
         let plan = g.plan(device).expect("a valid frame");
         assert!(plan.history_bytes() >= u64::from(2 * 4 * WIDTH * HEIGHT), "{}", plan.history_bytes());
-        let executor = Executor::new(device, plan).expect("an executor");
+        let executor = Executor::after(device, plan, earlier).expect("an executor");
         Self { executor, number, seen, left }
     }
 
@@ -151,6 +156,37 @@ fn a_frame_that_is_drawn_again_sees_the_same() {
     assert_eq!(all[1], (1, image_of(100)));
     assert_eq!(all[2], all[1], "drawn again");
     assert_eq!(all[3], (2, image_of(300)), "the one after it");
+    assert_clean(&device);
+}
+
+/// A plan that takes the place of another one reads what frames of that one wrote; one of another size begins with zeros.
+#[test]
+fn history_outlives_a_plan() {
+    let Some(device) = open() else { return };
+    let first = Remembering::new(&device);
+    assert!(!first.executor.takes_over());
+    let mut slot = first.slot();
+    send(&mut slot, 100, Turn::Even);
+    send(&mut slot, 200, Turn::Odd);
+    let held_bytes = device.held_bytes();
+    let second = Remembering::after(&device, WIDTH, Some(&first.executor));
+    assert!(second.executor.takes_over());
+    let added = device.held_bytes() - held_bytes;
+    let plan = second.executor.plan();
+    assert!(added < plan.peak_bytes(), "{added} bytes more: what is taken over is not made again");
+    // The first plan's last frame is drawn again, then one after it.
+    let mut later = second.slot();
+    send(&mut later, 300, Turn::Odd);
+    assert_eq!(seen(&mut later, 300), (1, image_of(100)));
+    drop((first, slot));
+    send(&mut later, 400, Turn::Even);
+    assert_eq!(seen(&mut later, 400), (2, image_of(300)));
+    let other = Remembering::after(&device, WIDTH + 1, Some(&second.executor));
+    assert!(!other.executor.takes_over(), "images of another size");
+    let mut slot = other.slot();
+    send(&mut slot, 500, Turn::Even);
+    let count = slot.read(0, |bytes| bytes[..4].to_vec()).expect("an output");
+    assert_eq!(count, [0; 4]);
     assert_clean(&device);
 }
 

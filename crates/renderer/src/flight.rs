@@ -227,7 +227,7 @@ impl Renderer {
         for_callers: bool,
     ) -> Result<Flight<'r>, TechniqueError> {
         let params = completed(technique, params);
-        let recipe = Recipe { technique, params: &params, moves: true, scene_moves: options.scene_moves };
+        let recipe = Recipe { technique, params: &params, moves: true, scene_moves: options.scene_moves, earlier: None };
         let prepared = self.prepare_to_move(&recipe, camera)?;
         let mut flight = Flight {
             renderer: self,
@@ -436,11 +436,14 @@ impl Flight<'_> {
             params: &self.params,
             moves: true,
             scene_moves: self.options.scene_moves,
+            earlier: Some(&self.prepared.executor),
         };
         self.prepared = self.renderer.record(&recipe, &settings, moved, capacities, &|_, _| {})?;
         self.demands = self.prepared.demands.clone().into();
         self.plan += 1;
-        self.chain = Chain::default();
+        if !self.prepared.executor.takes_over() {
+            self.chain = Chain::default();
+        }
         Ok(())
     }
 

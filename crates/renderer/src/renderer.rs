@@ -47,6 +47,8 @@ pub(crate) struct Recipe<'a> {
     pub moves: bool,
     /// Whether surfaces and lights may move then.
     pub scene_moves: bool,
+    /// Whose history the frame goes on with, where it has the same.
+    pub earlier: Option<&'a Executor>,
 }
 
 /// A scene on a device with a view of it: prepares techniques to run.
@@ -166,8 +168,8 @@ impl Renderer {
     ) -> Result<Prepared, TechniqueError> {
         self.check(technique)?;
         self.check_tessellation(technique)?;
-        let recipe =
-            Recipe { technique, params: &completed(technique, params), moves: false, scene_moves: false };
+        let params = &completed(technique, params);
+        let recipe = Recipe { technique, params, moves: false, scene_moves: false, earlier: None };
         self.prepare_recipe(&recipe, &self.settings, also)
     }
 
@@ -281,7 +283,7 @@ impl Renderer {
         capacities: Capacities,
         also: &impl Fn(&mut Graph, &ImageHandle),
     ) -> Result<Prepared, TechniqueError> {
-        let Recipe { technique, params, moves, scene_moves } = *recipe;
+        let Recipe { technique, params, moves, scene_moves, earlier } = *recipe;
         let options = *params.typed::<DrawParams>();
         let viewed = Viewed::new(settings, self.scene.clone(), self.lights.clone(), moved, options);
         let view = viewed.view();
@@ -333,7 +335,7 @@ impl Renderer {
         let final_color = graph.keep(&final_color);
         drop(frame);
         let plan = graph.plan(&self.device)?;
-        let executor = Executor::new(&self.device, plan)?;
+        let executor = Executor::after(&self.device, plan, earlier)?;
         let kept = Kept {
             hdr: hdr_id.filter(|_| settings.keep_hdr),
             depth,

@@ -4,7 +4,7 @@
 
 mod engine;
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use afterlight_image::{Rgba8Image, write_png};
 use afterlight_renderer::{Done, Embedded, FrameContext, Renderer};

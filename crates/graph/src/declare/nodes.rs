@@ -11,7 +11,7 @@ use super::raster_pass::Load;
 use super::raster_state::RasterState;
 use super::script::ScriptId;
 
-#[derive(Clone)]
+#[derive(Clone, PartialEq, Eq)]
 pub(crate) enum ResourceKind {
     Image(ImageInfo),
     Buffer { bytes: u64 },

@@ -26,7 +26,7 @@ use crate::report::{FrameReport, PassReport, ResourceReport};
 use builder::Builder;
 use commands::{BarrierList, BoundPass};
 use resources::{Physical, make_resources};
-use turn::{clear_history, taking_turns};
+use turn::{clear_history, taken_over, taking_turns};
 
 pub use read_back::ResourceKey;
 pub use slot::{FrameInput, FrameSlot, FrameTimes};
@@ -40,6 +40,7 @@ pub struct Executor {
     bound: Vec<Bound>,
     /// The turn of the last run.
     last: Option<Turn>,
+    takes_over: bool,
     memory: Vec<ResourceReport>,
     /// Steps of the plan's scripts.
     scripts: Vec<Vec<Step>>,
@@ -59,8 +60,22 @@ impl Executor {
     /// No memory, a limit of the device, a shader that the driver refuses; an imported resource without the usage that
     /// the passes need.
     pub fn new(device: &Device, plan: Plan) -> Result<Self, GraphError> {
-        let physical = make_resources(device, &plan)?;
-        clear_history(device, &plan, &physical)?;
+        Self::after(device, plan, None)
+    }
+
+    /// The same for a plan that takes the place of an earlier one, of which it takes the resources with history where it has the same: then
+    /// its frames read what frames of the earlier plan wrote ([`Executor::takes_over`]).
+    ///
+    /// # Errors
+    /// As [`Executor::new`].
+    pub fn after(device: &Device, plan: Plan, earlier: Option<&Self>) -> Result<Self, GraphError> {
+        let earlier = earlier.filter(|earlier| earlier.plan.has_history());
+        let taken = earlier.and_then(|one| taken_over(&plan, &one.plan, &one.bound[0].physical));
+        let physical = make_resources(device, &plan, taken.as_deref())?;
+        let takes_over = taken.is_some();
+        if !takes_over {
+            clear_history(device, &plan, &physical)?;
+        }
         let mut bound = Vec::new();
         let mut pipelines = None;
         for physical in taking_turns(&plan, physical) {
@@ -88,7 +103,8 @@ impl Executor {
             })
             .collect();
         let scripts = vec![Vec::new(); plan.scripts as usize];
-        Ok(Self { device: device.clone(), bound, last: None, memory, plan, scripts })
+        let last = earlier.filter(|_| takes_over).and_then(|earlier| earlier.last);
+        Ok(Self { device: device.clone(), bound, last, takes_over, memory, plan, scripts })
     }
 
     /// Returns the plan.
@@ -103,6 +119,11 @@ impl Executor {
     /// If the script is of another graph with more of them.
     pub fn set_script(&mut self, script: ScriptId, steps: Vec<Step>) {
         self.scripts[script.0 as usize] = steps;
+    }
+
+    /// Whether its resources with history, all of them, are those of the plan before it: what they hold is of use. Without history it is false.
+    pub fn takes_over(&self) -> bool {
+        self.takes_over
     }
 
     /// Turns that frames take: one without history.

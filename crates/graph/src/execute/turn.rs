@@ -50,6 +50,32 @@ pub(super) fn taking_turns(plan: &Plan, physical: Vec<Physical>) -> Vec<Vec<Phys
     vec![physical, odd]
 }
 
+/// What an earlier plan's resources are that take the places of the plan's resources with history, by the numbers of the plan's; `None` where it
+/// has not the same ones, to be used in the same ways, or none at all. Other entries are unused.
+pub(super) fn taken_over(plan: &Plan, earlier: &Plan, physical: &[Physical]) -> Option<Vec<Physical>> {
+    let mut taken = vec![Physical::Unused; plan.resources.len()];
+    for (index, resource) in plan.resources.iter().enumerate() {
+        let Some(version) = resource.version.filter(|_| resource.placement.is_some()) else { continue };
+        let there = earlier.resource(&resource.name)?.0 as usize;
+        let found = &earlier.resources[there];
+        let is_same_version = match (version, found.version?) {
+            (Version::Now { .. }, Version::Now { .. }) => true,
+            (Version::Before { .. }, Version::Before { .. }) => true,
+            (Version::Now { .. } | Version::Before { .. }, _) => false,
+        };
+        let is_same = is_same_version
+            && found.kind == resource.kind
+            && found.image_usage == resource.image_usage
+            && found.buffer_usage == resource.buffer_usage
+            && found.final_layouts == resource.final_layouts;
+        if !is_same || matches!(physical[there], Physical::Unused) {
+            return None;
+        }
+        taken[index] = physical[there].clone();
+    }
+    plan.has_history().then_some(taken)
+}
+
 /// Makes both versions of resources with history zero, images in the layout in which frames find them: what the first frame reads is defined.
 pub(super) fn clear_history(device: &Device, plan: &Plan, physical: &[Physical]) -> Result<(), GraphError> {
     if !plan.has_history() {

@@ -112,7 +112,9 @@ fn every_barrier_of_history_is_needed() {
         }
         mutants.len()
     };
-    let drop = |barriers: &mut Vec<crate::Barrier>, number: usize| drop(barriers.remove(number));
+    let drop = |barriers: &mut Vec<crate::Barrier>, number: usize| {
+        barriers.remove(number);
+    };
     assert!(caught(&accumulating(), drop) >= 5, "barriers of an image and a buffer");
     // A frame of buffers alone has no barriers at its end, which would order everything.
     let mut g = Graph::new();

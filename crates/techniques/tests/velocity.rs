@@ -1,0 +1,243 @@
+//! Velocities of surfaces against a twin in f64: rays find what each pixel shows, and where that stood in the frame before.
+
+mod common;
+
+use std::sync::Arc;
+
+use afterlight_oracle::{
+    deform::posed_vertices_ws,
+    raster::{Hit, RayScene, place_of, ray_through},
+};
+use afterlight_renderer::{FlightOptions, FrameContext, Renderer, ScenePose};
+use afterlight_stages::surfaces::velocity::{NOWHERE_PX, VELOCITY};
+use afterlight_techniques::{
+    Params, Settings, Technique, find, registry,
+    scene::{AlphaMode, Camera, LoadOptions, Pose, Scene, load},
+    shader::Shader,
+};
+use common::{Stage, compiled_variant};
+use glam::{DVec2, DVec3, Quat, Vec3};
+
+const SIZE: (u32, u32) = (96, 64);
+const SIZE_PX: [u32; 2] = [SIZE.0, SIZE.1];
+/// 16-bit floats round by this share of the value.
+const ROUNDING: f64 = 1.0 / 2048.0;
+/// What 32-bit floats lose between vertices and pixels, pixels.
+const LOST_PX: f64 = 0.01;
+/// Nearer to an edge of a triangle than this, as a barycentric coordinate, rounding may show another one.
+const DOUBTFUL: f64 = 1e-3;
+/// Where a ray as far beside a pixel's centre shows another triangle, rounding may.
+const AROUND_PX: f64 = 0.02;
+
+/// A frame of a flight.
+#[derive(Clone)]
+struct Shown {
+    camera: Camera,
+    pose: Option<Pose>,
+    cut: bool,
+}
+
+impl Shown {
+    fn still(camera: &Camera) -> Self {
+        Self { camera: camera.clone(), pose: None, cut: false }
+    }
+}
+
+/// Velocities of each frame of a flight, pixels, rows from the top.
+fn flown(
+    stage: &Stage,
+    technique: &dyn Technique,
+    (samples, shaders): (u32, &[Shader]),
+    frames: &[Shown],
+) -> Vec<Vec<[f32; 2]>> {
+    let id = technique.info().id;
+    let mut settings = stage.from(frames[0].camera.clone(), SIZE, 3);
+    (settings.view, settings.samples) = ("velocity".to_owned(), samples);
+    let renderer = Renderer::with_scene(&stage.device, stage.uploaded.clone(), &settings);
+    let mut renderer = renderer.unwrap_or_else(|e| panic!("{e}"));
+    renderer.add_shaders(shaders.iter().cloned());
+    let scene_moves = frames.iter().any(|frame| frame.pose.is_some());
+    let options = FlightOptions { scene_moves, ..FlightOptions::default() };
+    let mut flight = renderer
+        .fly(technique, &Params::default(), &settings.camera, options)
+        .unwrap_or_else(|e| panic!("{id}: {e}"));
+    let mut velocities = Vec::new();
+    for (index, frame) in (0..).zip(frames) {
+        let pose = frame.pose.as_ref().map(|pose| Arc::new(ScenePose::of(&stage.scene, pose, false)));
+        let (camera, cut) = (frame.camera.clone(), frame.cut);
+        let context = FrameContext { index, time_s: 0.1 * index as f64, cut, camera, pose };
+        flight.frame(context, &mut |_| Ok(())).unwrap_or_else(|e| panic!("{id}: {e}"));
+        flight.land(&mut |_| Ok(())).unwrap_or_else(|e| panic!("{id}: {e}"));
+        velocities.push(velocities_of(&flight.executor().read_image(VELOCITY).expect("kept")));
+    }
+    velocities
+}
+
+fn velocities_of(bytes: &[u8]) -> Vec<[f32; 2]> {
+    let value = |half: &[u8]| half::f16::from_le_bytes([half[0], half[1]]).to_f32();
+    bytes.chunks_exact(4).map(|pixel| [value(&pixel[..2]), value(&pixel[2..])]).collect()
+}
+
+/// A scene in the poses of a frame and of the one before.
+struct Twin<'a> {
+    scene: &'a Scene,
+    now: Scene,
+    before: Vec<Vec<DVec3>>,
+    cameras: [&'a Camera; 2],
+}
+
+impl<'a> Twin<'a> {
+    fn new(scene: &'a Scene, before: &'a Shown, now: &'a Shown) -> Self {
+        let rest = scene.pose_at(0.0);
+        let mut posed = scene.clone();
+        if let Some(pose) = &now.pose {
+            posed.take_pose(pose);
+        }
+        let pose = before.pose.as_ref().unwrap_or(&rest);
+        let vertices =
+            |i| posed_vertices_ws(scene, pose, i).iter().map(|vertex| vertex.position).collect();
+        let before_ws = (0..scene.instances.len()).map(vertices).collect();
+        Self { scene, now: posed, before: before_ws, cameras: [&before.camera, &now.camera] }
+    }
+
+    /// Where the point of a hit stood in the frame before.
+    fn point_before_ws(&self, hit: &Hit) -> DVec3 {
+        let mesh = &self.scene.meshes[self.scene.instances[hit.instance as usize].mesh as usize];
+        let first = mesh.first_index as usize + 3 * hit.triangle as usize;
+        let corner = |k: usize| self.before[hit.instance as usize][self.scene.indices[first + k] as usize];
+        let [b, c] = hit.barycentric.to_array();
+        (1.0 - b - c) * corner(0) + b * corner(1) + c * corner(2)
+    }
+
+    /// What a pixel shows; `None` where rounding decides that.
+    fn surely_shown(&self, rays: &RayScene<'_>, center_px: DVec2) -> Option<Option<Hit>> {
+        let is_doubtful = |hit: &Hit| {
+            hit.edge_distance < DOUBTFUL || rays.material(hit.instance).alpha_mode != AlphaMode::Opaque
+        };
+        let at = |offset_px: DVec2| {
+            let ray = ray_through(self.cameras[1], center_px + offset_px, SIZE_PX);
+            match rays.surfaces(&ray, is_doubtful).first() {
+                None => Some(None),
+                Some(hit) => (!is_doubtful(hit)).then_some(Some(*hit)),
+            }
+        };
+        let place = |hit: &Option<Hit>| hit.map(|hit| hit.place());
+        let shown = at(DVec2::ZERO)?;
+        let around = [DVec2::X, DVec2::NEG_X, DVec2::Y, DVec2::NEG_Y];
+        let is_steady = around.into_iter().all(|one| at(AROUND_PX * one).is_some_and(|hit| place(&hit) == place(&shown)));
+        is_steady.then_some(shown)
+    }
+
+    /// How far off velocities are, in what is allowed; and of how many pixels with a surface, pixels without one. Pixels whose surface rounding
+    /// decides are left out.
+    fn worst(&self, found: &[[f32; 2]]) -> (f64, usize, usize) {
+        let rays = RayScene::new(&self.now);
+        let (mut worst, mut surfaces, mut empty) = (0.0f64, 0, 0);
+        for (k, found) in found.iter().enumerate() {
+            let pixel = [k as u32 % SIZE.0, k as u32 / SIZE.0];
+            let center_px = DVec2::new(f64::from(pixel[0]), f64::from(pixel[1])) + 0.5;
+            let found = DVec2::from_array(found.map(f64::from));
+            let Some(shown) = self.surely_shown(&rays, center_px) else { continue };
+            let expected = shown.map_or(DVec2::ZERO, |hit| self.velocity_px(&hit, center_px));
+            let allowed = expected.abs() * ROUNDING + LOST_PX;
+            worst = worst.max(((found - expected).abs() / allowed).max_element());
+            (surfaces, empty) = match shown {
+                Some(_) => (surfaces + 1, empty),
+                None => (surfaces, empty + 1),
+            };
+        }
+        (worst, surfaces, empty)
+    }
+
+    /// Velocity of the point of a hit at a place.
+    fn velocity_px(&self, hit: &Hit, place_px: DVec2) -> DVec2 {
+        let farthest_px = DVec2::splat(NOWHERE_PX.into());
+        let before_px = place_of(self.cameras[0], self.point_before_ws(hit), SIZE_PX);
+        before_px.map_or(farthest_px, |before_px| (place_px - before_px).clamp(-farthest_px, farthest_px))
+    }
+}
+
+/// A walk that turns and sinks.
+fn path(stage: &Stage, frames: u16) -> Vec<Shown> {
+    let first = stage.scene.cameras.first().expect("a camera").clone();
+    let forward = -Vec3::from(first.world_from_view.matrix3.z_axis);
+    let at = |frame: u16| {
+        let t = f32::from(frame);
+        let place = first.eye_ws() + forward * (0.3 * t) - Vec3::Y * 0.05 * t;
+        let aim = Quat::from_rotation_y(0.03 * t) * forward;
+        let mut camera = Camera::look_at("walk", place, place + aim, 1.0, 0.1);
+        camera.projection = first.projection;
+        Shown::still(&camera)
+    };
+    (0..frames).map(at).collect()
+}
+
+fn is_zero(velocities: &[[f32; 2]]) -> bool {
+    velocities.iter().all(|velocity| *velocity == [0.0; 2])
+}
+
+#[test]
+fn a_camera_that_moves_moves_all_surfaces() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=20000");
+    let frames = path(&stage, 4);
+    let forward = find("forward").expect("known");
+    let velocities = flown(&stage, forward, (1, &[]), &frames);
+    assert!(is_zero(&velocities[0]), "nothing was before the first frame");
+    for k in 1..frames.len() {
+        let twin = Twin::new(&stage.scene, &frames[k - 1], &frames[k]);
+        let (worst, surfaces, empty) = twin.worst(&velocities[k]);
+        println!("frame {k}: {worst:.3} of what is allowed, {surfaces} pixels, {empty} without a surface");
+        assert!(worst <= 1.0, "frame {k}: {worst:.3} times what is allowed");
+        assert!(surfaces > 3000, "{surfaces} pixels compared");
+        let mixed_up = Twin::new(&stage.scene, &frames[k], &frames[k]).worst(&velocities[k]).0;
+        assert!(mixed_up > 10.0, "frame {k} does not move");
+    }
+}
+
+/// Samples whose nodes, skins and morph targets move.
+const SAMPLES: [&str; 4] = [
+    "motion/RiggedFigure/RiggedFigure.glb",
+    "motion/01_morphed_cube/01_morphed_cube.gltf",
+    "motion/InterpolationTest/InterpolationTest.glb",
+    "motion/kenney_character/character.glb",
+];
+
+/// Poses of the first animation as the camera goes by; the last frame shows the pose before once more.
+fn moving(stage: &Stage) -> Vec<Shown> {
+    let mut frames = path(stage, 5);
+    let duration_s = stage.scene.animations.first().map_or(0.0, |animation| animation.duration_s);
+    for (frame, part) in frames.iter_mut().zip([0.1, 0.22, 0.37, 0.5, 0.5]) {
+        frame.pose = Some(stage.scene.pose_at(part * duration_s));
+    }
+    frames
+}
+
+#[test]
+fn what_moves_by_itself_moves_with_the_camera() {
+    let gpu = afterlight_testkit::gpu();
+    let Some(root) = afterlight_testkit::shared_scenes() else { return };
+    let forward = find("forward").expect("known");
+    let mut deformed = 0;
+    for sample in SAMPLES {
+        let file = root.join("samples").join(sample);
+        let scene = load(&file, &LoadOptions::default()).unwrap_or_else(|e| panic!("{sample}: {e}"));
+        deformed += usize::from(!scene.deformations.is_empty());
+        let stage = Stage::of(&gpu, scene);
+        let frames = moving(&stage);
+        let velocities = flown(&stage, forward, (1, &[]), &frames);
+        assert!(is_zero(&velocities[0]), "{sample}: nothing was before the first frame");
+        for k in 1..frames.len() {
+            let twin = Twin::new(&stage.scene, &frames[k - 1], &frames[k]);
+            let (worst, surfaces, empty) = twin.worst(&velocities[k]);
+            println!("{sample}, frame {k}: {worst:.3} of what is allowed, {surfaces} and {empty} pixels");
+            assert!(worst <= 1.0, "{sample}, frame {k}: {worst:.3} times what is allowed");
+            assert!(surfaces > 100, "{sample}: {surfaces} pixels compared");
+            let rigid = Shown { pose: frames[k].pose.clone(), ..frames[k - 1].clone() };
+            let by_camera = Twin::new(&stage.scene, &rigid, &frames[k]).worst(&velocities[k]).0;
+            let moves = k < 4;
+            assert_eq!(by_camera > 1.0, moves, "{sample}, frame {k}: {by_camera:.3} off the camera's alone");
+        }
+    }
+    assert!(deformed >= 2, "{deformed} samples with skins or morph targets");
+}
