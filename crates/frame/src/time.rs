@@ -71,8 +71,12 @@ mod tests {
         let alone = FrameTime::default().constants(of_view);
         assert_eq!((alone.before, alone.clip_from_world_before), (0, now), "none before: as now");
         let before = ViewBefore { clip_from_world: Mat4::IDENTITY, records: None };
-        let mut time =
-            FrameTime { index: (1 << 32) + 7, time_s: 0.5, before: Some(Arc::new(before)), has_history: false };
+        let mut time = FrameTime {
+            index: (1 << 32) + 7,
+            time_s: 0.5,
+            before: Some(Arc::new(before)),
+            has_history: false,
+        };
         let found = time.constants(of_view);
         assert_eq!((found.frame_index, found.time_s, found.before), (7, 0.5, BEFORE_VIEW));
         assert_eq!(found.clip_from_world_before, Mat4::IDENTITY.to_cols_array_2d());

@@ -136,7 +136,8 @@ pub fn play(
                 (true, _) => flight.land(&mut done)?,
                 (false, true) => {
                     let camera = how.camera(path, frame);
-                    let context = FrameContext { index: frame, time_s, cut: false, camera, pose: pose.clone() };
+                    let context =
+                        FrameContext { index: frame, time_s, cut: false, camera, pose: pose.clone() };
                     flight.frame(context, &mut done)?;
                 }
                 (false, false) => flight.poll(&mut done)?,

@@ -227,7 +227,13 @@ impl Renderer {
         for_callers: bool,
     ) -> Result<Flight<'r>, TechniqueError> {
         let params = completed(technique, params);
-        let recipe = Recipe { technique, params: &params, moves: true, scene_moves: options.scene_moves, earlier: None };
+        let recipe = Recipe {
+            technique,
+            params: &params,
+            moves: true,
+            scene_moves: options.scene_moves,
+            earlier: None,
+        };
         let prepared = self.prepare_to_move(&recipe, camera)?;
         let mut flight = Flight {
             renderer: self,

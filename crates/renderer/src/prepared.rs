@@ -7,8 +7,8 @@ use afterlight_graph::{Executor, FrameInput, FrameReport, ResourceId, gpu};
 use afterlight_scene::{Camera, Light, ShapePose};
 
 use afterlight_frame::{
-    CameraView, DrawParams, FrameTime, LightPairs, SceneLights, Settings, TechniqueError, View, ViewBefore, ViewInput, ViewInputs,
-    ViewScript,
+    CameraView, DrawParams, FrameTime, LightPairs, SceneLights, Settings, TechniqueError, View, ViewBefore,
+    ViewInput, ViewInputs, ViewScript,
     capacity::{Capacities, Counter, Demand},
     scene::{
         SceneGpu,
@@ -70,7 +70,8 @@ impl Viewed {
     ) -> Self {
         let camera = CameraView::fitted(settings, moved.placed.as_deref().unwrap_or(&scene.rest));
         let (draws, time) = (DrawChoice::new(options), FrameTime::default());
-        let mut viewed = Self { settings: settings.clone(), camera, draws, moved, pose: 0, time, scene, lights };
+        let mut viewed =
+            Self { settings: settings.clone(), camera, draws, moved, pose: 0, time, scene, lights };
         viewed.choose_draws();
         viewed
     }

@@ -11,12 +11,12 @@ use afterlight_oracle::{
 use afterlight_renderer::{FlightOptions, FrameContext, Renderer, ScenePose};
 use afterlight_stages::surfaces::velocity::{NOWHERE_PX, VELOCITY};
 use afterlight_techniques::{
-    Params, Settings, Technique, find, registry,
+    Params, Technique, find, registry,
     scene::{AlphaMode, Camera, LoadOptions, Pose, Scene, load},
     shader::Shader,
 };
 use common::{Stage, compiled_variant};
-use glam::{DVec2, DVec3, Quat, Vec3};
+use glam::{Affine3A, DVec2, DVec3, Quat, Vec3};
 
 const SIZE: (u32, u32) = (96, 64);
 const SIZE_PX: [u32; 2] = [SIZE.0, SIZE.1];
@@ -94,8 +94,7 @@ impl<'a> Twin<'a> {
             posed.take_pose(pose);
         }
         let pose = before.pose.as_ref().unwrap_or(&rest);
-        let vertices =
-            |i| posed_vertices_ws(scene, pose, i).iter().map(|vertex| vertex.position).collect();
+        let vertices = |i| posed_vertices_ws(scene, pose, i).iter().map(|vertex| vertex.position).collect();
         let before_ws = (0..scene.instances.len()).map(vertices).collect();
         Self { scene, now: posed, before: before_ws, cameras: [&before.camera, &now.camera] }
     }
@@ -124,7 +123,8 @@ impl<'a> Twin<'a> {
         let place = |hit: &Option<Hit>| hit.map(|hit| hit.place());
         let shown = at(DVec2::ZERO)?;
         let around = [DVec2::X, DVec2::NEG_X, DVec2::Y, DVec2::NEG_Y];
-        let is_steady = around.into_iter().all(|one| at(AROUND_PX * one).is_some_and(|hit| place(&hit) == place(&shown)));
+        let is_steady =
+            around.into_iter().all(|one| at(AROUND_PX * one).is_some_and(|hit| place(&hit) == place(&shown)));
         is_steady.then_some(shown)
     }
 
@@ -199,8 +199,8 @@ fn a_camera_that_moves_moves_all_surfaces() {
 const SAMPLES: [&str; 4] = [
     "motion/RiggedFigure/RiggedFigure.glb",
     "motion/01_morphed_cube/01_morphed_cube.gltf",
-    "motion/InterpolationTest/InterpolationTest.glb",
-    "motion/kenney_character/character.glb",
+    "motion/robot/robot.glb",
+    "motion/06_parent-inverse-anim/06_parent-inverse-anim.gltf",
 ];
 
 /// Poses of the first animation as the camera goes by; the last frame shows the pose before once more.
@@ -211,6 +211,41 @@ fn moving(stage: &Stage) -> Vec<Shown> {
         frame.pose = Some(stage.scene.pose_at(part * duration_s));
     }
     frames
+}
+
+/// Instances that turn and rise as the camera goes by.
+fn turning(stage: &Stage) -> Vec<Shown> {
+    let mut frames = path(stage, 3);
+    for (frame, t) in frames.iter_mut().zip([0.0, 1.0, 2.0f32]) {
+        let mut pose = stage.scene.pose_at(0.0);
+        for (k, world_from_object) in pose.world_from_object.iter_mut().enumerate() {
+            let rise = Affine3A::from_translation(Vec3::Y * 0.1 * t * (k % 2) as f32);
+            *world_from_object =
+                rise * *world_from_object * Affine3A::from_rotation_y(0.02 * t * (k % 3) as f32);
+        }
+        frame.pose = Some(pose);
+    }
+    frames
+}
+
+#[test]
+fn instances_move_by_their_own_matrices() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=20000");
+    let frames = turning(&stage);
+    let forward = find("forward").expect("known");
+    let velocities = flown(&stage, forward, (1, &[]), &frames);
+    for k in 1..frames.len() {
+        let (worst, surfaces, _) = Twin::new(&stage.scene, &frames[k - 1], &frames[k]).worst(&velocities[k]);
+        println!("frame {k}: {worst:.3} of what is allowed, {surfaces} pixels");
+        assert!(worst <= 1.0, "frame {k}: {worst:.3} times what is allowed");
+    }
+    let vertex = "surfaces/geometry/surface.vert";
+    let changed = ("= position_before(position_os)", "= world");
+    let mutant = compiled_variant(&format!("{vertex}#velocity"), &format!("{vertex}.glsl"), &[changed]);
+    let found = flown(&stage, forward, (1, &[mutant]), &frames);
+    let worst = Twin::new(&stage.scene, &frames[0], &frames[1]).worst(&found[1]).0;
+    assert!(worst > 10.0, "surfaces where they are now: not caught, {worst:.3}");
 }
 
 #[test]
@@ -240,4 +275,82 @@ fn what_moves_by_itself_moves_with_the_camera() {
         }
     }
     assert!(deformed >= 2, "{deformed} samples with skins or morph targets");
+}
+
+/// Shaders that take one thing of this frame for that of the frame before: the twin sees each.
+#[test]
+fn mutants_are_caught() {
+    let gpu = afterlight_testkit::gpu();
+    let Some(root) = afterlight_testkit::shared_scenes() else { return };
+    let forward = find("forward").expect("known");
+    let vertex = "surfaces/geometry/surface.vert#velocity";
+    let mutant = |header: &str, from: &str, to: &str| compiled_variant(vertex, header, &[(from, to)]);
+    let before = "surfaces/geometry/before.glsl";
+    let mutants = [
+        (
+            "this frame's matrix",
+            mutant(
+                "surfaces/geometry/clip_before.glsl",
+                "frame.clip_from_world_before",
+                "frame.clip_from_world",
+            ),
+            "motion/RiggedFigure/RiggedFigure.glb",
+        ),
+        (
+            "this frame's shapes",
+            mutant(
+                before,
+                "vec3(positions_before[i], positions_before[i + 1u], positions_before[i + 2u])",
+                "now_os",
+            ),
+            "motion/RiggedFigure/RiggedFigure.glb",
+        ),
+    ];
+    for (what, shader, sample) in mutants {
+        let scene = load(&root.join("samples").join(sample), &LoadOptions::default());
+        let stage = Stage::of(&gpu, scene.unwrap_or_else(|e| panic!("{sample}: {e}")));
+        let frames = moving(&stage);
+        let velocities = flown(&stage, forward, (1, &[shader]), &frames);
+        let worst = Twin::new(&stage.scene, &frames[0], &frames[1]).worst(&velocities[1]).0;
+        println!("{what}: {worst:.1} times what is allowed");
+        assert!(worst > 3.0, "{what}: not caught, {worst:.3}");
+    }
+}
+
+#[test]
+fn the_first_frame_and_a_cut_move_nothing() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=20000");
+    let mut frames = path(&stage, 5);
+    frames[2].cut = true;
+    let forward = find("forward").expect("known");
+    let zero: Vec<bool> = flown(&stage, forward, (1, &[]), &frames).iter().map(|one| is_zero(one)).collect();
+    assert_eq!(zero, [true, false, true, false, false]);
+    // A camera that stands still moves nothing either.
+    let still = vec![frames[0].clone(); 3];
+    assert!(flown(&stage, forward, (1, &[]), &still).iter().all(|one| is_zero(one)));
+    // Nor does a view alone, however often it runs.
+    let mut settings = stage.from(frames[0].camera.clone(), SIZE, 3);
+    settings.view = "velocity".to_owned();
+    let mut alone = stage.prepare(forward, &settings);
+    for _ in 0..2 {
+        alone.run().expect("drawn");
+        assert!(is_zero(&velocities_of(&alone.executor().read_image(VELOCITY).expect("kept"))));
+        let black = alone.final_rgba8().expect("read");
+        assert!(black.chunks_exact(4).all(|pixel| pixel[..3] == [0; 3]));
+    }
+}
+
+/// Velocities are of the scene, not of who draws it: one for all techniques, at any number of samples.
+#[test]
+fn every_technique_shows_the_same() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=20000");
+    let frames = path(&stage, 2);
+    let expected = flown(&stage, find("forward").expect("known"), (1, &[]), &frames);
+    for technique in registry() {
+        let samples = if technique.info().samples.contains(&4) { 4 } else { 1 };
+        let found = flown(&stage, *technique, (samples, &[]), &frames);
+        assert!(found == expected, "{} at {samples} samples", technique.info().id);
+    }
 }

@@ -165,7 +165,13 @@ fn draw(
             (CallersCommands::new(commands), target)
         };
         view.frame(
-            FrameContext { index: shown, time_s: start.elapsed().as_secs_f64(), cut: false, camera: camera.clone(), pose: None },
+            FrameContext {
+                index: shown,
+                time_s: start.elapsed().as_secs_f64(),
+                cut: false,
+                camera: camera.clone(),
+                pose: None,
+            },
             &commands_of_view,
             &target,
         )?;

@@ -30,13 +30,9 @@ pub fn record(graph: &mut Graph, frame: &Frame<'_>) -> Result<(), TechniqueError
         return Ok(());
     }
     let before = Before::declare(graph, frame)?;
-    let target =
-        graph.image(VELOCITY, BufferRole::Shared, frame.image_info(vk::Format::R16G16_SFLOAT));
-    let depth = graph.image(
-        "shared/velocity depth",
-        BufferRole::Shared,
-        frame.image_info(vk::Format::D32_SFLOAT),
-    );
+    let target = graph.image(VELOCITY, BufferRole::Shared, frame.image_info(vk::Format::R16G16_SFLOAT));
+    let depth =
+        graph.image("shared/velocity depth", BufferRole::Shared, frame.image_info(vk::Format::D32_SFLOAT));
     let mut draws = SceneDraws::new(
         frame,
         ("surfaces/geometry/surface.vert#velocity", Some("surfaces/velocity/velocity.frag")),
