@@ -57,9 +57,26 @@ impl PlaySpec {
     /// Place of a frame on a path that takes `path_s` seconds, 0 to 1. A path that is longer than the frames is flown in part; of a shorter one the
     /// end holds, unless it is `closed` and begins anew.
     fn place(&self, frame: u64, path_s: f64, closed: bool) -> f32 {
+        self.rounds_and_place(frame, path_s, closed).1
+    }
+
+    /// Rounds of the path that lie behind a frame, and its place within the path.
+    fn rounds_and_place(&self, frame: u64, path_s: f64, closed: bool) -> (f64, f32) {
         let path_s = self.path_s.unwrap_or(path_s);
         let rounds = if path_s > 0.0 { self.time_s(frame) / path_s } else { 0.0 };
-        (if closed && rounds > 1.0 { rounds.fract() } else { rounds.min(1.0) }) as f32
+        match closed && rounds > 1.0 {
+            true => (rounds.floor(), rounds.fract() as f32),
+            false => (0.0, rounds.min(1.0) as f32),
+        }
+    }
+
+    /// Whether the camera jumps between two frames.
+    fn is_cut_between(&self, path: &CameraPath, from: u64, to: u64) -> bool {
+        let places = [from, to].map(|frame| {
+            let (rounds, place) = self.rounds_and_place(frame, path.duration_s(), path.closed);
+            rounds + f64::from(place)
+        });
+        path.is_cut_between_places(places[0], places[1])
     }
 
     /// The camera of a frame.
@@ -116,6 +133,8 @@ pub fn play(
     let task = listener.task("frames", how.frames);
     let mut seen: Vec<Option<Seen>> = (0..how.frames).map(|_| None).collect();
     let mut failed = None;
+    // Of each flight.
+    let mut last_frames: Vec<Option<u64>> = vec![None; flights.len()];
     for frame in 0..=how.frames {
         let is_over = frame == how.frames;
         let turn = how.switch_every.map_or(0, |every| frame / u64::from(every)) as usize % flights.len();
@@ -136,8 +155,9 @@ pub fn play(
                 (true, _) => flight.land(&mut done)?,
                 (false, true) => {
                     let camera = how.camera(path, frame);
-                    let context =
-                        FrameContext { index: frame, time_s, cut: false, camera, pose: pose.clone() };
+                    let last = last_frames[technique].replace(frame);
+                    let cut = last.is_some_and(|last| how.is_cut_between(path, last, frame));
+                    let context = FrameContext { index: frame, time_s, cut, camera, pose: pose.clone() };
                     flight.frame(context, &mut done)?;
                 }
                 (false, false) => flight.poll(&mut done)?,
@@ -359,6 +379,26 @@ mod tests {
         }
         let intervals_ms = intervals_ms(&seen).expect("timestamps");
         assert!(hitches(&intervals_ms, &seen, &["a", "b"]).is_empty());
+    }
+
+    /// A path that jumps in its middle, and where it begins anew.
+    #[test]
+    fn cuts_of_the_path_are_cuts_of_frames() {
+        let json = r#"{"name": "jumps", "closed": true, "keyframes": [
+            {"time_s": 0.0, "eye_ws": [0, 0, 0], "target_ws": [0, 0, -1], "fov_deg": 50, "cut": true},
+            {"time_s": 1.0, "eye_ws": [1, 0, 0], "target_ws": [1, 0, -1], "fov_deg": 50},
+            {"time_s": 1.0, "eye_ws": [9, 0, 0], "target_ws": [9, 0, -1], "fov_deg": 50, "cut": true},
+            {"time_s": 2.0, "eye_ws": [9, 1, 0], "target_ws": [9, 1, -1], "fov_deg": 50}]}"#;
+        let path = CameraPath::from_json(json, std::path::Path::new("jumps.json")).expect("a path");
+        let how = PlaySpec { frames: 30, fps: 4.0, path_s: Some(2.0), in_flight: 3, switch_every: None };
+        let cuts = (1..30).filter(|frame| how.is_cut_between(&path, frame - 1, *frame));
+        let jump = |frame: &u64| {
+            let [from, to] = [frame - 1, *frame].map(|frame| how.camera(&path, frame).eye_ws());
+            from.distance(to) > 2.0
+        };
+        let jumps: Vec<u64> = (1..30).filter(jump).collect();
+        assert_eq!(cuts.collect::<Vec<_>>(), jumps);
+        assert!(jumps.len() > 4, "{jumps:?}");
     }
 
     #[test]

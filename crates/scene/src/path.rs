@@ -490,6 +490,12 @@ impl CameraPath {
         self.shot_at(from_s) != self.shot_at(to_s)
     }
 
+    /// The same between two places as [`Self::at`] takes them, 0 the first keyframe and 1 the last. Beyond 1 a closed path goes round.
+    pub fn is_cut_between_places(&self, from: f64, to: f64) -> bool {
+        let time_s = |place: f64| self.start_s() + place * self.duration_s();
+        self.is_cut_between(time_s(from), time_s(to))
+    }
+
     /// A time within the path's own: wrapped where it is closed.
     fn within(&self, time_s: f64) -> f64 {
         let (start_s, end_s) = (self.start_s(), self.end_s());
