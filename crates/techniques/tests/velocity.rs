@@ -4,14 +4,15 @@ mod common;
 
 use std::sync::Arc;
 
+use afterlight_frame::TessellationEffect;
 use afterlight_oracle::{
     deform::posed_vertices_ws,
     raster::{Hit, RayScene, place_of, ray_through},
 };
-use afterlight_renderer::{FlightOptions, FrameContext, Renderer, ScenePose};
+use afterlight_renderer::{Done, FlightOptions, FrameContext, Renderer, ScenePose};
 use afterlight_stages::surfaces::velocity::{NOWHERE_PX, VELOCITY};
 use afterlight_techniques::{
-    Params, Technique, find, registry,
+    Params, Settings, Technique, TechniqueError, find, registry,
     scene::{AlphaMode, Camera, LoadOptions, Pose, Scene, load},
     shader::Shader,
 };
@@ -50,9 +51,19 @@ fn flown(
     (samples, shaders): (u32, &[Shader]),
     frames: &[Shown],
 ) -> Vec<Vec<[f32; 2]>> {
+    let settings = Settings { samples, ..stage.from(frames[0].camera.clone(), SIZE, 3) };
+    flown_with(stage, technique, (&settings, shaders), frames)
+}
+
+/// The same with settings, whose view it chooses.
+fn flown_with(
+    stage: &Stage,
+    technique: &dyn Technique,
+    (settings, shaders): (&Settings, &[Shader]),
+    frames: &[Shown],
+) -> Vec<Vec<[f32; 2]>> {
     let id = technique.info().id;
-    let mut settings = stage.from(frames[0].camera.clone(), SIZE, 3);
-    (settings.view, settings.samples) = ("velocity".to_owned(), samples);
+    let settings = Settings { view: "velocity".to_owned(), ..settings.clone() };
     let renderer = Renderer::with_scene(&stage.device, stage.uploaded.clone(), &settings);
     let mut renderer = renderer.unwrap_or_else(|e| panic!("{e}"));
     renderer.add_shaders(shaders.iter().cloned());
@@ -352,5 +363,106 @@ fn every_technique_shows_the_same() {
         let samples = if technique.info().samples.contains(&4) { 4 } else { 1 };
         let found = flown(&stage, *technique, (samples, &[]), &frames);
         assert!(found == expected, "{} at {samples} samples", technique.info().id);
+    }
+}
+
+/// Greatest distance of velocities from those of the points that depth of a frame drawn alone shows, seen through both cameras, in what is
+/// allowed; and of how many pixels.
+fn off_depth(
+    stage: &Stage,
+    settings: &Settings,
+    [before, now]: [&Camera; 2],
+    found: &[[f32; 2]],
+) -> (f64, usize) {
+    let settings = Settings { camera: now.clone(), keep_depth: true, ..settings.clone() };
+    let mut alone = stage.prepare(find("forward").expect("known"), &settings);
+    alone.run().expect("drawn");
+    let depth = alone.depth().expect("read").expect("kept");
+    let [a, b, c, d] = depth.to_distance.map(f64::from);
+    let (mut worst, mut count) = (0.0f64, 0);
+    for (k, (found, z)) in found.iter().zip(&depth.values).enumerate() {
+        let center_px = DVec2::new((k as u32 % SIZE.0).into(), (k as u32 / SIZE.0).into()) + 0.5;
+        let z = f64::from(*z);
+        if z == 0.0 {
+            worst = worst.max(if *found == [0.0; 2] { 0.0 } else { f64::INFINITY });
+            continue;
+        }
+        let ray = ray_through(now, center_px, SIZE_PX);
+        let point_ws = ray.origin_ws + (a * z + b) / (c * z + d) * ray.direction_ws;
+        let before_px = place_of(before, point_ws, SIZE_PX).expect("before the eye");
+        let expected = center_px - before_px;
+        let allowed = expected.abs() * ROUNDING + LOST_PX;
+        worst = worst.max(((DVec2::from_array(found.map(f64::from)) - expected).abs() / allowed).max_element());
+        count += 1;
+    }
+    (worst, count)
+}
+
+/// Surfaces as they are, divided, and displaced: their velocities are those of the depths that `forward` draws.
+#[test]
+fn velocities_are_of_the_depth_that_is_drawn() {
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, "builtin:colonnade?triangles=20000");
+    let frames = path(&stage, 3);
+    let forward = find("forward").expect("known");
+    let mut ways = vec![None];
+    if afterlight_testkit::has_tessellation(&gpu) {
+        ways.extend([Some((8.0, 0.0)), Some((4.0, 80.0))]);
+    }
+    for way in ways {
+        let mut settings = stage.from(frames[0].camera.clone(), SIZE, 3);
+        if let Some((edge_px, displacement_mm)) = way {
+            settings.effects.tessellation = TessellationEffect { edge_px: Some(edge_px), displacement_mm };
+        }
+        let velocities = flown_with(&stage, forward, (&settings, &[]), &frames);
+        for k in 1..frames.len() {
+            let cameras = [&frames[k - 1].camera, &frames[k].camera];
+            let (worst, count) = off_depth(&stage, &settings, cameras, &velocities[k]);
+            println!("{way:?}, frame {k}: {worst:.3} of what is allowed, {count} pixels");
+            assert!(worst <= 1.0 && count > 4000, "{way:?}, frame {k}: {worst:.3}, {count} pixels");
+        }
+    }
+}
+
+/// However many frames are on their way, each shows what it shows alone on its way.
+#[test]
+fn frames_in_flight_show_the_same() {
+    let gpu = afterlight_testkit::gpu();
+    let Some(root) = afterlight_testkit::shared_scenes() else { return };
+    let forward = find("forward").expect("known");
+    for sample in SAMPLES {
+        let scene = load(&root.join("samples").join(sample), &LoadOptions::default());
+        let stage = Stage::of(&gpu, scene.unwrap_or_else(|e| panic!("{sample}: {e}")));
+        let frames = moving(&stage);
+        let mut settings = stage.from(frames[0].camera.clone(), SIZE, 3);
+        settings.view = "velocity".to_owned();
+        let renderer = Renderer::with_scene(&stage.device, stage.uploaded.clone(), &settings);
+        let renderer = renderer.unwrap_or_else(|e| panic!("{e}"));
+        let pictures = [1, 3].map(|in_flight| {
+            let options =
+                FlightOptions { in_flight, pictures: true, scene_moves: true, ..FlightOptions::default() };
+            let flight = renderer.fly(forward, &Params::default(), &settings.camera, options);
+            let mut flight = flight.unwrap_or_else(|e| panic!("{sample}: {e}"));
+            let mut pictures = Vec::new();
+            let mut done = |frame: &Done<'_>| -> Result<(), TechniqueError> {
+                pictures.push(frame.rgba8.expect("asked for").to_vec());
+                Ok(())
+            };
+            // Every pose twice in a row, so that places of the flight meet surfaces that have stopped.
+            for (index, frame) in (0..).zip(frames.iter().flat_map(|frame| [frame, frame])) {
+                let pose = frame.pose.as_ref().expect("a pose");
+                let pose = Some(Arc::new(ScenePose::of(&stage.scene, pose, false)));
+                let camera = frames[0].camera.clone();
+                let context = FrameContext { index, time_s: 0.0, cut: false, camera, pose };
+                flight.frame(context, &mut done).unwrap_or_else(|e| panic!("{sample}: {e}"));
+            }
+            flight.land(&mut done).unwrap_or_else(|e| panic!("{sample}: {e}"));
+            pictures
+        });
+        assert!(pictures[0] == pictures[1], "{sample}: another picture with others on their way");
+        let is_black = |picture: &Vec<u8>| picture.chunks_exact(4).all(|pixel| pixel[..3] == [0; 3]);
+        let black: Vec<bool> = pictures[0].iter().map(is_black).collect();
+        let expected = [true, true, false, true, false, true, false, true, true, true];
+        assert_eq!(black, expected, "{sample}: what stops moves no more");
     }
 }
