@@ -31,7 +31,7 @@ impl Renderer {
 
 impl Embedded<'_> {
     /// Adds a frame to the caller's commands and a copy of its picture, of the size of the renderer's settings, to the caller's image.
-    /// Numbers of frames rise. Frames wait for what was recorded before them in the queue's order, and all that follows waits for the
+    /// Numbers of frames rise. Command buffers are submitted in the order in which frames were added: each may read what the one before left. Frames wait for what was recorded before them in the queue's order, and all that follows waits for the
     /// picture. How many are recorded before the first is done is the caller's choice; each holds its own inputs ([`Flight::bytes`]).
     ///
     /// # Errors
@@ -47,7 +47,7 @@ impl Embedded<'_> {
     }
 
     /// The device is done with the command buffers of all frames up to number `index`, or they will never be submitted: hands these frames
-    /// to `done`, in their order. A frame that fell short of room says so ([`Done::fell_short`]); lists that had none, or hardly any, have
+    /// to `done`, in their order. The frame after such ones is a [cut](FrameContext::cut): they have left it nothing. A frame that fell short of room says so ([`Done::fell_short`]); lists that had none, or hardly any, have
     /// more of it in frames that are recorded from now on. That is a plan on this thread, which submits to the queue.
     ///
     /// # Errors
