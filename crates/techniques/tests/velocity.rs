@@ -191,7 +191,11 @@ fn is_zero(velocities: &[[f32; 2]]) -> bool {
 fn a_camera_that_moves_moves_all_surfaces() {
     let gpu = afterlight_testkit::gpu();
     let stage = Stage::new(&gpu, "builtin:colonnade?triangles=20000");
-    let frames = path(&stage, 4);
+    let mut frames = path(&stage, 4);
+    // About turn: what shows now was behind the eye.
+    let mut around = frames[3].clone();
+    around.camera.world_from_view.matrix3 *= glam::Mat3A::from_rotation_y(std::f32::consts::PI);
+    frames.push(around);
     let forward = find("forward").expect("known");
     let velocities = flown(&stage, forward, (1, &[]), &frames);
     assert!(is_zero(&velocities[0]), "nothing was before the first frame");
@@ -204,6 +208,8 @@ fn a_camera_that_moves_moves_all_surfaces() {
         let mixed_up = Twin::new(&stage.scene, &frames[k], &frames[k]).worst(&velocities[k]).0;
         assert!(mixed_up > 10.0, "frame {k} does not move");
     }
+    let nowhere = velocities[4].iter().filter(|velocity| **velocity == [NOWHERE_PX; 2]).count();
+    assert!(nowhere > 1000, "{nowhere} pixels show what was behind the eye");
 }
 
 /// Samples whose nodes, skins and morph targets move.
