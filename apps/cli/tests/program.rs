@@ -186,7 +186,10 @@ fn lists_are_text_and_json() {
     );
     for one in list {
         let views = one["views"].as_array().expect("a list");
-        assert!(["light-count", "light-error"].iter().all(|view| views.contains(&(*view).into())), "{one}");
+        assert!(
+            ["light-count", "light-error", "velocity"].iter().all(|view| views.contains(&(*view).into())),
+            "{one}"
+        );
     }
     let plain = text(&run(&["techniques"]).stdout);
     assert!(plain.contains("forward") && plain.contains("appendix A"), "{plain}");

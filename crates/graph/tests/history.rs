@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 
 use afterlight_gpu::{Buffer, BufferDesc, Device, DeviceOptions, GpuError, MemoryKind, vk};
 use afterlight_graph::{
-    BufferRole, Executor, FrameInput, FrameSlot, Graph, ImageInfo, PassRole, ResourceId, Turn,
+    BufferRole, Executor, FrameInput, FrameSlot, Graph, ImageInfo, Load, PassRole, ResourceId, Subresource,
+    Turn,
 };
 use afterlight_shader::Shader;
 use afterlight_shader::compile::Compiler;
@@ -216,6 +217,41 @@ fn runs_take_turns() {
         assert_eq!(words[1], expected, "run {k}");
         let left = frame.executor.read_image("image").expect("kept");
         assert_eq!(bytemuck::cast_slice::<u8, u32>(&left), image_of(7), "run {k}");
+    }
+    assert_clean(&device);
+}
+
+/// Levels, layers and depth are kept as they are: colours by copies, depth by a raster pass.
+#[test]
+fn levels_layers_and_depth_have_history() {
+    let Some(device) = open() else { return };
+    let color = ImageInfo::new(vk::Format::R8G8B8A8_UNORM, WIDTH, HEIGHT).mips(3).layers(2);
+    let depth = ImageInfo::new(vk::Format::D32_SFLOAT, WIDTH, HEIGHT);
+    let mut g = Graph::new();
+    let colors = g.history_image("colors", BufferRole::Targets, color);
+    let shown = g.image("shown", BufferRole::Targets, color);
+    let shown = g.copy_image("show", PassRole::Upkeep, &colors.before, shown);
+    let _colors = g.clear_image("color", PassRole::Upkeep, colors.now, [1.0, 0.0, 0.2, 1.0]);
+    let depths = g.history_image("depths", BufferRole::Depth, depth);
+    let told = g.buffer("told", BufferRole::Depth, u64::from(4 * WIDTH * HEIGHT));
+    let told =
+        g.copy_image_to_buffer("tell", PassRole::Upkeep, &depths.before, Subresource::mip_layer(0, 0), told);
+    let mut pass = g.raster("draw depth", PassRole::DepthPrepass);
+    let _depths = pass.depth(depths.now, Load::Clear(0.25));
+    pass.finish();
+    g.keep(&shown);
+    g.keep(&told);
+    let plan = g.plan(&device).expect("a valid frame");
+    let mut executor = Executor::new(&device, plan).expect("an executor");
+    for run in 0..3 {
+        executor.run().expect("a frame");
+        let (texel, z) = if run == 0 { ([0; 4], 0.0f32) } else { ([255, 0, 51, 255], 0.25) };
+        let shown = executor.read_image("shown").expect("kept");
+        assert_eq!(shown.len(), 2 * 4 * (WIDTH * HEIGHT) as usize, "both layers");
+        assert!(shown.chunks_exact(4).all(|found| found == texel), "run {run}: {:?}", &shown[..4]);
+        let told = executor.read_buffer("told").expect("kept");
+        let told: &[f32] = bytemuck::cast_slice(&told);
+        assert!(told.iter().all(|found| *found == z), "run {run}: {}", told[0]);
     }
     assert_clean(&device);
 }

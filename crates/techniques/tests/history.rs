@@ -44,8 +44,11 @@ impl Technique for Remembers {
 
     fn record(&self, graph: &mut Graph, frame: &Frame<'_>) -> Result<ImageHandle, TechniqueError> {
         let _radiance = self.0.record(graph, frame)?;
-        let left =
-            graph.history_image("test/left", BufferRole::Counters, ImageInfo::new(vk::Format::R32_UINT, 1, 1));
+        let left = graph.history_image(
+            "test/left",
+            BufferRole::Counters,
+            ImageInfo::new(vk::Format::R32_UINT, 1, 1),
+        );
         let info = frame.image_info(vk::Format::R16G16B16A16_SFLOAT);
         let hdr = graph.image("test/seen", BufferRole::Targets, info);
         let shader = frame.shader("test/remember.comp")?;
@@ -131,11 +134,14 @@ fn frames_find_what_the_one_before_left() {
     let gpu = afterlight_testkit::gpu();
     let (stage, settings, _, near) = stage(&gpu);
     let frames = [false, false, false, true, false].map(|cut| (&near, cut));
-    let seen = flown(&stage, &settings, (3, "forward"), &frames);
     let expected = [(0, 0), (1, ALL), (2, ALL), (3, 0), (4, ALL)];
-    for (k, ((seen, _), (left, before))) in (0..).zip(seen.iter().zip(expected)) {
-        let expected = Seen { left, before, index: k, time_s: 0.25 * k as f32 };
-        assert_eq!(*seen, expected, "frame {k}");
+    // The second records its commands again for each frame.
+    for inner in ["forward", "hybrid"] {
+        let seen = flown(&stage, &settings, (3, inner), &frames);
+        for (k, ((seen, _), (left, before))) in (0..).zip(seen.iter().zip(expected)) {
+            let expected = Seen { left, before, index: k, time_s: 0.25 * k as f32 };
+            assert_eq!(*seen, expected, "{inner}, frame {k}");
+        }
     }
 }
 
@@ -164,7 +170,7 @@ fn a_frame_that_is_drawn_again_keeps_history() {
     assert_eq!(seen[9].0.before, ALL, "history begins anew");
 }
 
-/// A technique that plans each view anew keeps what it remembers.
+/// A technique that plans each view anew keeps what it remembers, and no more memory with each plan.
 #[test]
 fn history_outlives_plans_of_views() {
     let gpu = afterlight_testkit::gpu();
@@ -185,4 +191,8 @@ fn history_outlives_plans_of_views() {
     for (k, (found, _)) in (1..).zip(&seen[1..]) {
         assert_eq!((found.left, found.before), (k, ALL), "frame {k}");
     }
+    let held_bytes = gpu.held_bytes();
+    let seen = flown(&stage, &settings, (3, "gbuffer-list"), &[(&far, false); 12]);
+    assert_eq!(seen[11].0.left, 11);
+    assert_eq!(gpu.held_bytes(), held_bytes, "after three times as many plans");
 }

@@ -398,7 +398,8 @@ fn off_depth(
         let before_px = place_of(before, point_ws, SIZE_PX).expect("before the eye");
         let expected = center_px - before_px;
         let allowed = expected.abs() * ROUNDING + LOST_PX;
-        worst = worst.max(((DVec2::from_array(found.map(f64::from)) - expected).abs() / allowed).max_element());
+        worst =
+            worst.max(((DVec2::from_array(found.map(f64::from)) - expected).abs() / allowed).max_element());
         count += 1;
     }
     (worst, count)

@@ -6,8 +6,7 @@
 
 mod engine;
 
-use std::sync::Arc;
-use std::time::Duration;
+use std::{sync::Arc, time::Duration};
 
 use afterlight_image::{Rgba8Image, write_png};
 use afterlight_renderer::{Done, Embedded, FrameContext, Renderer, ScenePose};
@@ -106,7 +105,8 @@ fn main() -> Result<(), Error> {
     let settings = Settings { view: options.view.clone(), ..Settings::for_scene(&scene, HALF[0], HALF[1]) };
     let renderer = Renderer::new(&device, &scene, &settings)?;
     let technique = find(&options.technique).ok_or(format!("no technique {}", options.technique))?;
-    let mut view = renderer.embed(technique, &Params::default(), &settings.camera, plays(&scene))?;
+    let mut view =
+        renderer.embed(technique, &Params::default(), &settings.camera, !scene.animations.is_empty())?;
 
     let shown = Shown { scene: &scene, camera: &settings.camera };
     let drawn = draw(&options, &mut events, &mut app, &mut engine, &mut view, &shown);
@@ -141,11 +141,6 @@ fn adopt(engine: &mut Engine) -> Result<Device, Error> {
     Ok(unsafe { Device::adopt(&adopted, &DeviceOptions::default()) }?)
 }
 
-/// Whether a scene moves by itself.
-fn plays(scene: &scene::Scene) -> bool {
-    !scene.animations.is_empty()
-}
-
 /// What the frames show.
 struct Shown<'a> {
     scene: &'a scene::Scene,
@@ -155,7 +150,7 @@ struct Shown<'a> {
 impl Shown<'_> {
     fn frame(&self, index: u64) -> FrameContext {
         let time_s = index as f64 / 30.0;
-        let pose = plays(self.scene)
+        let pose = (!self.scene.animations.is_empty())
             .then(|| Arc::new(ScenePose::of(self.scene, &self.scene.pose_at(time_s), false)));
         FrameContext { index, time_s, cut: false, camera: self.camera.clone(), pose }
     }
