@@ -46,7 +46,7 @@ pub(crate) struct DeviceInner {
     pub queue_family: u32,
     without_float_stencil: bool,
     /// Whether another program owns device and instance.
-    is_adopted: bool,
+    pub is_adopted: bool,
     queue: Mutex<Queue>,
     /// Counts submissions: its value is the number of the last one that is done, and all before it are.
     timeline: vk::Semaphore,

@@ -102,6 +102,7 @@ pub fn play(
         shortfall: Shortfall::DrawAgain,
         pictures: sees.is_some(),
         scene_moves: poses.is_some(),
+        plans_ahead: true,
     };
     let first = how.camera(path, 0);
     let task = listener.task("preparing", chosen.len() as u64);
@@ -230,6 +231,8 @@ fn cause(event: &Event) -> String {
     match event {
         Event::Planned => "planned anew for its view".to_owned(),
         Event::Grown(counter) => format!("{} grew", counter.name),
+        Event::PlanBegun => "began a larger plan".to_owned(),
+        Event::PlanTaken => "first with a larger plan".to_owned(),
         Event::DrawnAgain => "drawn again".to_owned(),
     }
 }
@@ -238,7 +241,7 @@ fn record(
     session: &Session,
     spec: &FrameSpec,
     (path, how): (&CameraPath, &PlaySpec),
-    (chosen, flights): (&[Chosen], &[Flight<'_>]),
+    (chosen, flights): (&[Chosen], &[Flight]),
     seen: &[Seen],
 ) -> Play {
     let ids: Vec<&str> = chosen.iter().map(Chosen::id).collect();
@@ -263,7 +266,7 @@ fn record(
                 capacity: short.capacity,
                 dropped: short.dropped,
             }),
-            Event::Planned | Event::DrawnAgain => None,
+            Event::Planned | Event::PlanBegun | Event::PlanTaken | Event::DrawnAgain => None,
         };
         seen.events.iter().filter_map(one).collect()
     };
@@ -277,7 +280,7 @@ fn record(
         device: session.device.clone(),
         scene: session.scene.clone(),
         settings: SettingsRecord {
-            camera: how.camera(path, 0).name,
+            camera: how.camera(path, 0).name.to_string(),
             ..session.settings_record(spec, u32::try_from(how.frames).unwrap_or(u32::MAX), ids[0])
         },
         path: path.name.clone(),

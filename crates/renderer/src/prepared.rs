@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::flight::ScenePose;
+use crate::pose::ScenePose;
 use afterlight_graph::{Executor, FrameInput, FrameReport, ResourceId, gpu};
 use afterlight_scene::{Camera, Light, ShapePose};
 
@@ -167,7 +167,7 @@ pub struct Prepared {
     /// Whether the inputs and scripts are all that depends on the view.
     pub(crate) shows_all_views: bool,
     pub(crate) capacities: Capacities,
-    pub(crate) demands: Vec<Demand>,
+    pub(crate) demands: Arc<[Demand]>,
     pub(crate) kept: Kept,
     /// Draws in view.
     pub draw_calls: u32,
@@ -184,7 +184,7 @@ impl Prepared {
         draw_calls: u32,
     ) -> Result<Self, TechniqueError> {
         let (inputs, scripts, shows_all_views) = inputs.into_parts();
-        let demands = capacities.demands();
+        let demands = capacities.demands().into();
         let device = device.clone();
         let mut prepared = Self {
             device,

@@ -49,7 +49,8 @@ pub(crate) struct Recipe<'a> {
     pub scene_moves: bool,
 }
 
-/// A scene on a device with a view of it: prepares techniques to run.
+/// A scene on a device with a view of it: prepares techniques to run. Clones share what is on the device.
+#[derive(Clone)]
 pub struct Renderer {
     device: gpu::Device,
     scene: Arc<SceneGpu>,
@@ -94,6 +95,22 @@ impl Renderer {
             volume_indices,
             extra_shaders: Vec::new(),
         })
+    }
+
+    /// A renderer of the same scene and shaders with other settings. Lights that stay are shared, so that another size costs no upload.
+    ///
+    /// # Errors
+    /// As [`Renderer::new`].
+    pub fn with_settings(&self, settings: Settings) -> Result<Self, TechniqueError> {
+        check_size(&self.device, &settings)?;
+        let mut other = self.clone();
+        if settings.lights != self.settings.lights {
+            let mut uploader = self.device.uploader()?;
+            other.lights = Arc::new(SceneLights::new(&self.device, &mut uploader, &settings.lights)?);
+            uploader.finish()?;
+        }
+        other.settings = settings;
+        Ok(other)
     }
 
     /// Adds shaders of techniques from outside this crate; their names come before the built-in ones.

@@ -257,8 +257,8 @@ pub enum Projection {
 /// A camera: looks along its −Z, +Y up.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Camera {
-    /// Name, as `--camera` takes it.
-    pub name: String,
+    /// Name, as `--camera` takes it; shared, since every frame has a camera and none should allocate for it.
+    pub name: Arc<str>,
     /// Camera to world, rigid.
     pub world_from_view: Affine3A,
     /// Projection.
@@ -534,7 +534,7 @@ impl Camera {
         let right = forward.cross(up).normalize();
         let up = right.cross(forward);
         Self {
-            name: name.to_owned(),
+            name: name.into(),
             world_from_view: Affine3A::from_cols(right.into(), up.into(), (-forward).into(), eye_ws.into()),
             projection: Projection::Perspective { fov_y_rad, near_m },
         }

@@ -364,7 +364,7 @@ impl CameraPath {
         if name == FLY_THROUGH {
             return Some(Self::fly_through(scene));
         }
-        let mut cameras = (0..scene.cameras.len()).filter(|&index| scene.cameras[index].name == name);
+        let mut cameras = (0..scene.cameras.len()).filter(|&index| *scene.cameras[index].name == *name);
         cameras.find_map(|index| Self::of_camera(scene, index))
     }
 

@@ -133,7 +133,7 @@ fn draw(
     events: &mut EventLoop<()>,
     app: &mut App,
     engine: &mut Engine,
-    view: &mut Embedded<'_>,
+    view: &mut Embedded,
     camera: &Camera,
 ) -> Result<u64, Error> {
     let mut shown = 0;
