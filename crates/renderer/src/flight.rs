@@ -279,6 +279,11 @@ impl Flight {
         self.hand_on(usize::MAX, done)
     }
 
+    /// Frames that were not handed on yet.
+    pub fn on_their_way(&self) -> usize {
+        self.places.iter().filter(|place| place.flying.is_some()).count()
+    }
+
     /// Whether another view needs no new plan: all that depends on the view is an input.
     pub fn moves_without_plans(&self) -> bool {
         self.prepared.shows_all_views
@@ -336,7 +341,7 @@ impl Flight {
         done: &mut dyn FnMut(&Done<'_>) -> Result<(), TechniqueError>,
     ) -> Result<(), TechniqueError> {
         loop {
-            let flying = self.places.iter().filter(|place| place.flying.is_some()).count();
+            let flying = self.on_their_way();
             let Some(oldest) = self.places.iter().position(|place| place.flying.is_some()) else {
                 return Ok(());
             };

@@ -42,7 +42,7 @@ pub(crate) struct Kept {
 #[derive(Default)]
 pub(crate) struct Moved {
     pub placed: Option<Box<Placed>>,
-    pub lights: Option<Arc<SceneLights>>,
+    pub lights: Option<Box<SceneLights>>,
 }
 
 /// What a frame shows: all from which its inputs are computed.
@@ -94,13 +94,15 @@ impl Viewed {
         }
         self.pose += 1;
         let lights = pose.and_then(|pose| pose.lights.as_deref());
-        self.moved.lights = match lights {
-            None => None,
+        match lights {
+            None => self.moved.lights = None,
             Some(lights) => {
-                let moved = self.lights.moved(lights);
-                Some(Arc::new(moved.ok_or(TechniqueError::OtherLights { expected: self.lights.count })?))
+                let moved = self.moved.lights.get_or_insert_with(|| Box::new((*self.lights).clone()));
+                if !moved.set(lights) {
+                    return Err(TechniqueError::OtherLights { expected: self.lights.count });
+                }
             }
-        };
+        }
         let lights = lights.unwrap_or(rest_lights);
         self.settings.lights.clear();
         self.settings.lights.extend_from_slice(lights);
