@@ -3,6 +3,7 @@
 use std::{
     borrow::Cow,
     cell::{Cell, RefCell},
+    sync::{Mutex, PoisonError},
 };
 
 use afterlight_graph::{
@@ -281,7 +282,8 @@ impl Frame<'_> {
         self.inputs.declare(self.device, graph, named, how, fill)
     }
 
-    /// As [`Frame::table`], of words that the view decides: at most `most_words`, of which `words` gives the first.
+    /// As [`Frame::table`], of words that the view decides: at most `most_words`, of which `words` puts the first into an empty list, whose
+    /// memory is used again.
     ///
     /// # Errors
     /// The device.
@@ -290,11 +292,17 @@ impl Frame<'_> {
         graph: &mut Graph,
         named: (&str, BufferRole),
         most_words: usize,
-        words: impl Fn(&View<'_>) -> Vec<u32> + Send + Sync + 'static,
+        words: impl Fn(&View<'_>, &mut Vec<u32>) + Send + Sync + 'static,
     ) -> Result<BufferHandle, TechniqueError> {
         let usage = vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::INDIRECT_BUFFER;
         let how = (4 * most_words.max(1) as u64, usage, ChangesWith::Camera);
-        self.input(graph, named, how, move |view, bytes| put(bytes, 0, &words(view)))
+        let kept = Mutex::new(Vec::new());
+        self.input(graph, named, how, move |view, bytes| {
+            let mut list = kept.lock().unwrap_or_else(PoisonError::into_inner);
+            list.clear();
+            words(view, &mut list);
+            put(bytes, 0, &list);
+        })
     }
 
     /// Lets `steps` choose the draws of a pass for each view, among those that it declares.

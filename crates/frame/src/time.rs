@@ -12,7 +12,7 @@ pub const BEFORE_VIEW: u32 = 1;
 pub const BEFORE_HISTORY: u32 = 2;
 
 /// What a frame showed, for the frame after it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct ViewBefore {
     /// World to clip space.
     pub clip_from_world: Mat4,

@@ -55,7 +55,7 @@ pub use declare::{
     VertexStream,
 };
 pub use error::GraphError;
-pub use execute::{Executor, FrameInput, FrameSlot, FrameTimes, ResourceKey, Turn};
+pub use execute::{Executor, FrameInput, FrameSlot, FrameTimes, KeptHistory, ResourceKey, Turn};
 pub use plan::{
     Access, Barrier, MemoryNeed, Placement, Plan, PlannedHeap, PlannedPass, PlannedResource, Requirements,
     Traffic,

@@ -82,7 +82,8 @@ impl Remembering {
         let (seen, left) = (g.keep(&seen), g.keep(&image));
         let plan = g.plan(device).expect("a valid frame");
         assert!(plan.history_bytes() >= u64::from(2 * 4 * WIDTH * HEIGHT), "{}", plan.history_bytes());
-        let executor = Executor::after(device, plan, earlier).expect("an executor");
+        let history = earlier.and_then(Executor::history);
+        let executor = Executor::after(device, plan, history.as_ref()).expect("an executor");
         Self { executor, number, seen, left }
     }
 

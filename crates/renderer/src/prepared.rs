@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::flight::ScenePose;
+use crate::pose::ScenePose;
 use afterlight_graph::{Executor, FrameInput, FrameReport, ResourceId, gpu};
 use afterlight_scene::{Camera, Light, ShapePose};
 
@@ -42,7 +42,7 @@ pub(crate) struct Kept {
 #[derive(Default)]
 pub(crate) struct Moved {
     pub placed: Option<Box<Placed>>,
-    pub lights: Option<Arc<SceneLights>>,
+    pub lights: Option<Box<SceneLights>>,
 }
 
 /// What a frame shows: all from which its inputs are computed.
@@ -97,13 +97,15 @@ impl Viewed {
         }
         self.pose += 1;
         let lights = pose.and_then(|pose| pose.lights.as_deref());
-        self.moved.lights = match lights {
-            None => None,
+        match lights {
+            None => self.moved.lights = None,
             Some(lights) => {
-                let moved = self.lights.moved(lights);
-                Some(Arc::new(moved.ok_or(TechniqueError::OtherLights { expected: self.lights.count })?))
+                let moved = self.moved.lights.get_or_insert_with(|| Box::new((*self.lights).clone()));
+                if !moved.set(lights) {
+                    return Err(TechniqueError::OtherLights { expected: self.lights.count });
+                }
             }
-        };
+        }
         let lights = lights.unwrap_or(rest_lights);
         self.settings.lights.clear();
         self.settings.lights.extend_from_slice(lights);
@@ -149,10 +151,14 @@ impl Viewed {
         }
     }
 
-    /// What it shows, for the frame after it; with where draws stand if that frame asks.
-    pub fn as_before(&self, with_records: bool) -> ViewBefore {
-        let records = with_records.then(|| self.placed().records.clone());
-        ViewBefore { clip_from_world: self.camera.clip_from_world, records }
+    /// Writes what it shows, for the frame after it; with where draws stand if that frame asks.
+    pub fn write_as_before(&self, with_records: bool, before: &mut ViewBefore) {
+        before.clip_from_world = self.camera.clip_from_world;
+        if with_records {
+            before.records.get_or_insert_default().clone_from(&self.placed().records);
+        } else {
+            before.records = None;
+        }
     }
 }
 
@@ -177,7 +183,7 @@ pub struct Prepared {
     /// Whether the inputs and scripts are all that depends on the view.
     pub(crate) shows_all_views: bool,
     pub(crate) capacities: Capacities,
-    pub(crate) demands: Vec<Demand>,
+    pub(crate) demands: Arc<[Demand]>,
     pub(crate) kept: Kept,
     /// Whether frames ask where draws stood in the frame before.
     pub(crate) asks_for_records_before: bool,
@@ -197,7 +203,7 @@ impl Prepared {
     ) -> Result<Self, TechniqueError> {
         let asks_for_records_before = inputs.asks_for_records_before();
         let (inputs, scripts, shows_all_views) = inputs.into_parts();
-        let demands = capacities.demands();
+        let demands = capacities.demands().into();
         let device = device.clone();
         let mut prepared = Self {
             device,

@@ -3,7 +3,7 @@
 use std::{borrow::Cow, sync::Arc};
 
 use afterlight_graph::{
-    BufferRole, Executor, Graph, ImageHandle, ResourceId,
+    BufferRole, Executor, Graph, ImageHandle, KeptHistory, ResourceId,
     gpu::{self, vk},
 };
 use afterlight_scene::{Camera, Scene};
@@ -48,10 +48,11 @@ pub(crate) struct Recipe<'a> {
     /// Whether surfaces and lights may move then.
     pub scene_moves: bool,
     /// Whose history the frame goes on with, where it has the same.
-    pub earlier: Option<&'a Executor>,
+    pub earlier: Option<&'a KeptHistory>,
 }
 
-/// A scene on a device with a view of it: prepares techniques to run.
+/// A scene on a device with a view of it: prepares techniques to run. Clones share what is on the device.
+#[derive(Clone)]
 pub struct Renderer {
     device: gpu::Device,
     scene: Arc<SceneGpu>,
@@ -96,6 +97,22 @@ impl Renderer {
             volume_indices,
             extra_shaders: Vec::new(),
         })
+    }
+
+    /// A renderer of the same scene and shaders with other settings. Lights that stay are shared, so that another size costs no upload.
+    ///
+    /// # Errors
+    /// As [`Renderer::new`].
+    pub fn with_settings(&self, settings: Settings) -> Result<Self, TechniqueError> {
+        check_size(&self.device, &settings)?;
+        let mut other = self.clone();
+        if settings.lights != self.settings.lights {
+            let mut uploader = self.device.uploader()?;
+            other.lights = Arc::new(SceneLights::new(&self.device, &mut uploader, &settings.lights)?);
+            uploader.finish()?;
+        }
+        other.settings = settings;
+        Ok(other)
     }
 
     /// Adds shaders of techniques from outside this crate; their names come before the built-in ones.

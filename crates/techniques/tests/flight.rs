@@ -51,7 +51,7 @@ fn still(cameras: &[Camera]) -> impl Iterator<Item = FrameContext> + '_ {
 
 /// Flies and returns pictures and events.
 fn flown(
-    flight: &mut Flight<'_>,
+    flight: &mut Flight,
     contexts: impl IntoIterator<Item = FrameContext>,
 ) -> (Vec<Rgba8Image>, Vec<Vec<Event>>) {
     let (mut pictures, mut events) = (Vec::new(), Vec::new());
@@ -185,6 +185,8 @@ fn a_view_that_needs_far_more_than_the_last_is_drawn_again_or_told() {
             // What a list needs shows only where those that it follows from have room, so it takes a frame each. Landing, not the device's
             // speed, says which frames know of which.
             flight.land(&mut done).unwrap_or_else(|e| panic!("{id}: {e}"));
+            // The plan with room is made on another thread.
+            flight.wait_for_plan().unwrap_or_else(|e| panic!("{id}: {e}"));
         }
         assert_eq!((short[0], short[2], short[6]), (false, true, false), "{id}: {short:?}");
     }

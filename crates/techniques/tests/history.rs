@@ -92,11 +92,11 @@ fn flown(
     let renderer = Renderer::with_scene(&stage.device, stage.uploaded.clone(), settings);
     let mut renderer = renderer.unwrap_or_else(|e| panic!("{e}"));
     renderer.add_shaders([shader]);
-    let technique = Remembers(find(inner).expect("known"));
+    let technique: &'static Remembers = Box::leak(Box::new(Remembers(find(inner).expect("known"))));
     let shortfall = Shortfall::DrawAgain;
-    let options = FlightOptions { in_flight, shortfall, pictures: true, scene_moves: false };
+    let options = FlightOptions { in_flight, shortfall, pictures: true, ..FlightOptions::default() };
     let mut flight = renderer
-        .fly(&technique, &Params::default(), frames[0].0, options)
+        .fly(technique, &Params::default(), frames[0].0, options)
         .unwrap_or_else(|e| panic!("{inner}: {e}"));
     let mut seen = Vec::new();
     let mut done = |frame: &Done<'_>| -> Result<(), TechniqueError> {

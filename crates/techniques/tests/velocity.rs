@@ -47,7 +47,7 @@ impl Shown {
 /// Velocities of each frame of a flight, pixels, rows from the top.
 fn flown(
     stage: &Stage,
-    technique: &dyn Technique,
+    technique: &'static dyn Technique,
     (samples, shaders): (u32, &[Shader]),
     frames: &[Shown],
 ) -> Vec<Vec<[f32; 2]>> {
@@ -58,7 +58,7 @@ fn flown(
 /// The same with settings, whose view it chooses.
 fn flown_with(
     stage: &Stage,
-    technique: &dyn Technique,
+    technique: &'static dyn Technique,
     (settings, shaders): (&Settings, &[Shader]),
     frames: &[Shown],
 ) -> Vec<Vec<[f32; 2]>> {

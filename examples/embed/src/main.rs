@@ -162,7 +162,7 @@ fn draw(
     events: &mut EventLoop<()>,
     app: &mut App,
     engine: &mut Engine,
-    view: &mut Embedded<'_>,
+    view: &mut Embedded,
     of: &Shown<'_>,
 ) -> Result<u64, Error> {
     let mut shown = 0;

@@ -15,7 +15,7 @@ mod resources;
 mod slot;
 mod turn;
 
-use std::time::Instant;
+use std::{sync::Arc, time::Instant};
 
 use afterlight_gpu::{self as gpu, Device, vk};
 
@@ -35,7 +35,7 @@ pub use turn::Turn;
 /// A plan with everything that it needs on a device.
 pub struct Executor {
     device: Device,
-    plan: Plan,
+    plan: Arc<Plan>,
     /// One a turn: two where the plan has history, else one.
     bound: Vec<Bound>,
     /// The turn of the last run.
@@ -44,6 +44,14 @@ pub struct Executor {
     memory: Vec<ResourceReport>,
     /// Steps of the plan's scripts.
     scripts: Vec<Vec<Step>>,
+}
+
+/// Resources with history of a plan ([`Executor::history`]).
+pub struct KeptHistory {
+    plan: Arc<Plan>,
+    /// Those of the first turn, by the numbers of the plan's resources.
+    physical: Vec<Physical>,
+    last: Option<Turn>,
 }
 
 /// What frames of one turn record.
@@ -68,9 +76,9 @@ impl Executor {
     ///
     /// # Errors
     /// As [`Executor::new`].
-    pub fn after(device: &Device, plan: Plan, earlier: Option<&Self>) -> Result<Self, GraphError> {
-        let earlier = earlier.filter(|earlier| earlier.plan.has_history());
-        let taken = earlier.and_then(|one| taken_over(&plan, &one.plan, &one.bound[0].physical));
+    pub fn after(device: &Device, plan: Plan, earlier: Option<&KeptHistory>) -> Result<Self, GraphError> {
+        let plan = Arc::new(plan);
+        let taken = earlier.and_then(|one| taken_over(&plan, &one.plan, &one.physical));
         let physical = make_resources(device, &plan, taken.as_deref())?;
         let takes_over = taken.is_some();
         if !takes_over {
@@ -105,6 +113,15 @@ impl Executor {
         let scripts = vec![Vec::new(); plan.scripts as usize];
         let last = earlier.filter(|_| takes_over).and_then(|earlier| earlier.last);
         Ok(Self { device: device.clone(), bound, last, takes_over, memory, plan, scripts })
+    }
+
+    /// The resources with history, for a plan that takes the place of this one, on any thread; `None` where there are none.
+    pub fn history(&self) -> Option<KeptHistory> {
+        self.plan.has_history().then(|| KeptHistory {
+            plan: Arc::clone(&self.plan),
+            physical: self.bound[0].physical.clone(),
+            last: self.last,
+        })
     }
 
     /// Returns the plan.

@@ -380,6 +380,24 @@ impl FrameSlot {
         }
     }
 
+    /// Waits for the last submission, and lets `read` see its times and output number `output`, where one is named.
+    ///
+    /// # Errors
+    /// The device was lost.
+    pub fn finish_and_read<T>(
+        &mut self,
+        output: Option<usize>,
+        read: impl FnOnce(&FrameTimes, Option<&[u8]>) -> T,
+    ) -> Result<T, GraphError> {
+        self.finish()?;
+        let Some(output) = output else { return Ok(read(&self.times, None)) };
+        // Lent out, since the reading borrows the slot.
+        let times = std::mem::take(&mut self.times);
+        let seen = self.read(output, |bytes| read(&times, Some(bytes)));
+        self.times = times;
+        seen
+    }
+
     /// Bytes that the slot holds beside the plan, which all slots share.
     pub fn bytes(&self) -> u64 {
         [&self.ends.written, &self.ends.read].into_iter().flatten().map(gpu::Buffer::allocated_bytes).sum()

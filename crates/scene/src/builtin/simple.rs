@@ -35,7 +35,7 @@ pub(super) fn lamp(position_ws: Vec3, intensity: Vec3) -> Light {
 /// An orthographic camera that looks along −Z at the origin, 1 m from the middle to the upper edge.
 fn flat_camera(name: &str) -> Camera {
     Camera {
-        name: name.to_owned(),
+        name: name.into(),
         world_from_view: Affine3A::from_translation(Vec3::new(0.0, 0.0, 5.0)),
         projection: Projection::Orthographic { half_height_m: 1.0, near_m: 0.1, far_m: 10.0 },
     }
