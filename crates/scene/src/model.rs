@@ -528,7 +528,13 @@ impl Camera {
     }
 
     /// A perspective camera at `eye_ws` that looks at `target_ws`, +Y up (or +Z where it looks along Y).
-    pub fn look_at(name: impl Into<Arc<str>>, eye_ws: Vec3, target_ws: Vec3, fov_y_rad: f32, near_m: f32) -> Self {
+    pub fn look_at(
+        name: impl Into<Arc<str>>,
+        eye_ws: Vec3,
+        target_ws: Vec3,
+        fov_y_rad: f32,
+        near_m: f32,
+    ) -> Self {
         let forward = (target_ws - eye_ws).try_normalize().unwrap_or(Vec3::NEG_Z);
         let up = if forward.y.abs() > 0.9999 { Vec3::Z } else { Vec3::Y };
         let right = forward.cross(up).normalize();
