@@ -7,12 +7,15 @@ use std::{
     alloc::{GlobalAlloc, Layout, System},
     backtrace::Backtrace,
     cell::{Cell, RefCell},
-    sync::Arc,
+    sync::{
+        Arc,
+        atomic::{AtomicI64, Ordering},
+    },
 };
 
 use afterlight_renderer::{Done, Flight, FlightOptions, FrameContext, Renderer, ScenePose};
 use afterlight_techniques::{
-    Params, Settings, TechniqueError, registry,
+    Params, Settings, TechniqueError, find, registry,
     scene::{Camera, Light},
 };
 use common::Stage;
@@ -24,6 +27,13 @@ const LIGHTS: u32 = 20;
 /// Frames of the path, and those of them in which allocations count.
 const FRAMES: u64 = 60;
 const COUNTED: std::ops::Range<u64> = 10..FRAMES;
+
+/// Bytes that all threads hold.
+static LIVE_BYTES: AtomicI64 = AtomicI64::new(0);
+
+fn live(bytes: usize, sign: i64) {
+    LIVE_BYTES.fetch_add(sign * bytes as i64, Ordering::Relaxed);
+}
 
 thread_local! {
     static IS_COUNTING: Cell<bool> = const { Cell::new(false) };
@@ -52,23 +62,28 @@ fn count() {
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         count();
+        live(layout.size(), 1);
         // SAFETY: the caller keeps the contract of `alloc`.
         unsafe { System.alloc(layout) }
     }
 
     unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
         count();
+        live(layout.size(), 1);
         // SAFETY: the caller keeps the contract of `alloc_zeroed`.
         unsafe { System.alloc_zeroed(layout) }
     }
 
     unsafe fn realloc(&self, memory: *mut u8, layout: Layout, new_size: usize) -> *mut u8 {
         count();
+        live(new_size, 1);
+        live(layout.size(), -1);
         // SAFETY: the caller keeps the contract of `realloc`.
         unsafe { System.realloc(memory, layout, new_size) }
     }
 
     unsafe fn dealloc(&self, memory: *mut u8, layout: Layout) {
+        live(layout.size(), -1);
         // SAFETY: the caller keeps the contract of `dealloc`.
         unsafe { System.dealloc(memory, layout) }
     }
@@ -181,4 +196,53 @@ fn a_frame_of_a_camera_that_moves_allocates_nothing() {
 #[test]
 fn a_frame_of_a_scene_that_moves_allocates_nothing() {
     check(true);
+}
+
+/// Flights of other techniques, sizes and samples, each prepared while the one before flies: what they hold of the host and the device goes with
+/// them. What stays is what every flight after the first of its kind finds: pools and caches.
+#[test]
+fn flights_leave_nothing_in_memory() {
+    const ROUNDS: usize = 6;
+    let gpu = afterlight_testkit::gpu();
+    let stage = Stage::new(&gpu, SCENE);
+    let renderer = Renderer::with_scene(
+        &stage.device,
+        stage.uploaded.clone(),
+        &stage.from(camera(&stage, 0), SIZE, LIGHTS),
+    );
+    let renderer = renderer.unwrap_or_else(|e| panic!("{e}"));
+    let turns = [("visibility", 1, (48, 32)), ("gbuffer-list", 4, (33, 19)), ("clustered", 1, (64, 36))];
+    let turns = turns.into_iter().chain([("forward", 4, (48, 32)), ("dais", 1, (33, 19))]);
+    let mut held = Vec::new();
+    let mut now: Option<Flight> = None;
+    for _ in 0..ROUNDS {
+        for (id, samples, size) in turns.clone() {
+            let settings = Settings { samples, ..stage.from(camera(&stage, 0), size, LIGHTS) };
+            let technique = find(id).expect("known");
+            let ahead = renderer.fly_ahead(technique, &Params::default(), settings, FlightOptions::default());
+            let ahead = ahead.unwrap_or_else(|e| panic!("{id}: {e}"));
+            let mut done = |_: &Done<'_>| Ok(());
+            if let Some(flight) = &mut now {
+                for index in 0..4 {
+                    let context = FrameContext {
+                        index,
+                        time_s: 0.0,
+                        cut: false,
+                        camera: camera(&stage, index),
+                        pose: None,
+                    };
+                    flight.frame(context, &mut done).unwrap_or_else(|e| panic!("{e}"));
+                }
+            }
+            // Dropped with frames on their way.
+            now = Some(ahead.take().unwrap_or_else(|e| panic!("{id}: {e}")));
+        }
+        now = None;
+        held.push((LIVE_BYTES.load(Ordering::Relaxed), gpu.held_bytes(), gpu.held_objects()));
+    }
+    println!("bytes of the host, bytes and objects of the device: {held:?}");
+    let (first, last) = (held[2], held[ROUNDS - 1]);
+    assert_eq!((last.1, last.2), (first.1, first.2), "{held:?}");
+    // Threads come and go, and lists of who waits for what keep their memory.
+    assert!(last.0 - first.0 < 4 << 10, "{held:?}");
 }

@@ -269,7 +269,7 @@ fn a_frame_that_fell_short_is_drawn_again_with_the_plan_of_another_thread() {
         technique.gate.set(true);
         flown.frame(&nothing);
         flown.frame(&near(&stage));
-        while !flown.flight.is_planning() {
+        while !flown.flight.is_planning() && flown.seen.pictures.len() < 2 {
             flown.poll();
         }
         // Two more may be on their way.

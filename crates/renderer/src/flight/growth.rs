@@ -20,6 +20,8 @@ pub(super) struct Growth {
     /// The most that frames needed of each list since the plan was begun; it may be more than the plan has room for. Empty where no list asks
     /// for room.
     needs: Vec<Counter>,
+    /// Plans that followed one that frames had outgrown, without a frame that asked for them.
+    followed: u32,
     /// Whether no frame was drawn yet with the plan that was taken last.
     is_new: bool,
     /// What the frame in hand counted, kept for its memory.
@@ -88,9 +90,12 @@ impl Flight {
         for place in places {
             self.places.push_front(Place { plan, ..place });
         }
-        if self.prepared.capacities.lack(&self.growth.needs) {
+        // A list that cannot grow must not be planned for ever.
+        if self.growth.followed < DRAWN_AGAIN_MAX && self.prepared.capacities.lack(&self.growth.needs) {
+            self.growth.followed += 1;
             return self.begin_plan();
         }
+        self.growth.followed = 0;
         self.growth.needs.clear();
         Ok(())
     }
@@ -167,16 +172,19 @@ impl Flight {
         }
     }
 
-    /// Begins a plan with room for what the frame in hand needed, unless there is one. Where the frame `must_fit`, waits until there is room, if
-    /// it may. Returns whether there is.
+    /// Begins a plan with room for what the frame in hand needed, unless there is one. Where the frame `must_fit`, waits until there is room,
+    /// if it may, for a few plans at most. Returns whether it may be drawn again.
     fn ask_for_room(
         &mut self,
         flying: &mut Flying,
         must_fit: bool,
         may_wait: bool,
     ) -> Result<bool, TechniqueError> {
-        // A frame before this one may have made room already.
-        while self.prepared.capacities.lack(&self.growth.counted) {
+        for _ in 0..DRAWN_AGAIN_MAX {
+            // A frame before this one may have made room already.
+            if !self.prepared.capacities.lack(&self.growth.counted) {
+                break;
+            }
             self.growth.note();
             if !self.is_planning() {
                 flying.events.push(Event::PlanBegun);
