@@ -166,6 +166,12 @@ pub struct PlayArgs {
     /// Let the next technique take its turn after N frames
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub switch_every: Option<u32>,
+    /// Image sizes that take turns with the techniques, each prepared on another thread during the turn before
+    #[arg(long, value_name = "WxH,WxH…", value_delimiter = ',', value_parser = size_px, requires = "switch_every", conflicts_with = "output")]
+    pub sizes: Vec<[u32; 2]>,
+    /// Samples a pixel that take turns, where a technique can draw them
+    #[arg(long, value_name = "N,N…", value_delimiter = ',', value_parser = samples, requires = "switch_every")]
+    pub samples_list: Vec<u32>,
     /// Write every frame's picture: frames/%04d.png
     #[arg(short, long, value_name = "PATTERN")]
     pub output: Option<PathBuf>,
@@ -409,6 +415,13 @@ impl CommonArgs {
         spec.check()?;
         Ok(spec)
     }
+}
+
+/// Reads `160x90`.
+fn size_px(text: &str) -> Result<[u32; 2], String> {
+    let side = |text: &str| text.parse().ok().filter(|px: &u32| *px > 0);
+    let size_px = text.split_once('x').and_then(|(width, height)| Some([side(width)?, side(height)?]));
+    size_px.ok_or_else(|| "expected width and height in pixels, such as 160x90".to_owned())
 }
 
 fn samples(text: &str) -> Result<u32, String> {

@@ -186,7 +186,10 @@ fn lists_are_text_and_json() {
     );
     for one in list {
         let views = one["views"].as_array().expect("a list");
-        assert!(["light-count", "light-error"].iter().all(|view| views.contains(&(*view).into())), "{one}");
+        assert!(
+            ["light-count", "light-error", "velocity"].iter().all(|view| views.contains(&(*view).into())),
+            "{one}"
+        );
     }
     let plain = text(&run(&["techniques"]).stdout);
     assert!(plain.contains("forward") && plain.contains("appendix A"), "{plain}");
@@ -895,4 +898,43 @@ fn play_tells_how_steady_frames_are() {
     refused(&["play", "--technique", "tiled", "--in-flight", "9"], 2, &["--in-flight"]);
     refused(&["play", "--technique", "tiled", "--camera", "0"], 2, &["--camera", "--path"]);
     refused(&["play", "--technique", "tiled", "--path", "nowhere"], 2, &["nowhere", "nave"]);
+    let turns = ["play", "--technique", "tiled", "--switch-every", "3"];
+    refused(&[&turns[..], &["--sizes", "64"]].concat(), 2, &["--sizes", "160x90"]);
+    refused(&[&turns[..], &["--samples-list", "1,3"]].concat(), 2, &["--samples-list"]);
+    refused(&["play", "--technique", "tiled", "--sizes", "64x48"], 2, &["--switch-every"]);
+}
+
+/// Flights of other techniques, sizes and samples, each prepared while another one flies: every round begins with what the one before began
+/// with, and no message of validation.
+#[test]
+fn turns_of_technique_size_and_samples_leave_nothing_behind() {
+    if !has_device() {
+        return;
+    }
+    let folder = folder();
+    let scene = "builtin:spheres?rows=2&columns=3&segments=16";
+    let turns = ["--technique", "visibility,forward,dais", "--sizes", "64x48,48x32", "--samples-list", "1,4"];
+    // A camera that hardly moves: lists need the same in each round.
+    let how =
+        ["--switch-every", "15", "--frames", "600", "--path-seconds", "1e9", "--validate", "--json", "-"];
+    let output = run_in(folder.path(), &[&["play", scene], &turns[..], &how].concat());
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let played = json(&output);
+    let frames: u64 = played["techniques"]
+        .as_array()
+        .expect("a list")
+        .iter()
+        .filter_map(|one| one["frames"].as_u64())
+        .sum();
+    assert_eq!(frames, 600);
+    // Ten turns a round: `visibility` has one sample.
+    let held = played["held"].as_array().expect("a list");
+    assert_eq!(
+        held.iter().filter_map(|one| one["frame"].as_u64()).collect::<Vec<_>>(),
+        [0, 150, 300, 450, 600]
+    );
+    for what in ["device_bytes", "device_objects"] {
+        assert!(held[1][what].as_u64().expect("a number") > 0);
+        assert_eq!([&held[2][what], &held[3][what]], [&held[1][what]; 2], "{what}: {held:?}");
+    }
 }

@@ -25,6 +25,10 @@ pub struct TriangleIds(pub ImageHandle);
 /// Octahedral shading normals in world space, of the nearest surface of every pixel.
 pub struct SurfaceNormals(pub ImageHandle);
 
+/// How far the surface at the centre of each pixel has moved on screen since the frame before, pixels, RG16F: x to the right, y down. The place
+/// where it was is the pixel's centre minus that. Zero where no surface is, and where the frame before is of no use.
+pub struct Velocity(pub ImageHandle);
+
 /// Says that every surface of this frame visits every light, whatever structures there may be: set by the reference, whose image must not
 /// depend on them.
 pub struct VisitsAllLights;

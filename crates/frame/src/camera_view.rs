@@ -81,7 +81,8 @@ impl CameraView {
         }
     }
 
-    /// What `include/frame.glsl` declares, for this view of surfaces within `bounds_ws`, in the surroundings of the settings.
+    /// What `include/frame.glsl` declares, for this view of surfaces within `bounds_ws`, in the surroundings of the settings; of a view alone,
+    /// see [`FrameTime::constants`](crate::FrameTime::constants).
     pub fn constants(&self, settings: &Settings, lights: &SceneLights, bounds_ws: &Aabb) -> FrameConstants {
         let distance_from_world = self.distance_from_world();
         let near_m = match self.projection {
@@ -110,6 +111,10 @@ impl CameraView {
             unbounded_light_count: lights.unbounded_count,
             distance_range_m: distance_range_m(bounds_ws, distance_from_world, near_m),
             samples: settings.samples,
+            frame_index: 0,
+            time_s: 0.0,
+            before: 0,
+            clip_from_world_before: self.clip_from_world.to_cols_array_2d(),
         }
     }
 }

@@ -113,6 +113,9 @@ pub enum TechniqueError {
         /// The technique.
         technique: &'static str,
     },
+    /// The operating system gives no thread to plan on.
+    #[error("no thread to plan on: {0}")]
+    NoThread(std::io::Error),
     /// The device lacks features.
     #[error("{technique}: the device lacks {missing}")]
     Unavailable {

@@ -3,8 +3,9 @@
 use std::{
     borrow::Cow,
     cell::{Cell, RefCell},
+    mem,
     ops::Range,
-    sync::OnceLock,
+    sync::{Mutex, OnceLock, PoisonError},
 };
 
 use afterlight_graph::{
@@ -15,7 +16,7 @@ use afterlight_graph::{
 use afterlight_scene::Aabb;
 
 use crate::{
-    CameraView, DrawCommands, DrawParams, Frame, SceneGpu, SceneLights, Settings, TechniqueError,
+    CameraView, DrawCommands, DrawParams, Frame, FrameTime, SceneGpu, SceneLights, Settings, TechniqueError,
     scene::{
         BUCKETS,
         draw_list::{COMMAND_BYTES, DrawQuery, DrawsInOrder, write_commands, write_counts},
@@ -38,6 +39,8 @@ pub struct View<'a> {
     pub choice: &'a ViewChoice,
     /// Where surfaces stand.
     pub placed: &'a Placed,
+    /// When it is, and what the frame before showed.
+    pub time: &'a FrameTime,
 }
 
 /// How the draws of a view are chosen, and what the host has chosen so far: nothing unless something asks for it.
@@ -45,18 +48,39 @@ pub struct View<'a> {
 pub struct ViewChoice {
     /// How draws are chosen and ordered.
     pub options: DrawParams,
-    draws: OnceLock<DrawsInOrder>,
+    draws: OnceLock<Chosen>,
+    /// What was chosen before, kept for its memory.
+    unused: Mutex<Chosen>,
+}
+
+/// Draws that were chosen, and the words that they were sorted by.
+#[derive(Debug, Default)]
+struct Chosen {
+    draws: DrawsInOrder,
+    words: Vec<u64>,
 }
 
 impl ViewChoice {
     /// Draws that are to be chosen in this way.
     pub fn new(options: DrawParams) -> Self {
-        Self { options, draws: OnceLock::new() }
+        Self { options, ..Self::default() }
     }
 
     /// Forgets what was chosen: the view has changed.
     pub fn begin_view(&mut self) {
-        self.draws.take();
+        if let Some(chosen) = self.draws.take() {
+            *self.unused.get_mut().unwrap_or_else(PoisonError::into_inner) = chosen;
+        }
+    }
+
+    /// What the host has chosen, or chooses now.
+    fn chosen(&self, choose: impl FnOnce(&mut Chosen)) -> &DrawsInOrder {
+        let first = || {
+            let mut chosen = mem::take(&mut *self.unused.lock().unwrap_or_else(PoisonError::into_inner));
+            choose(&mut chosen);
+            chosen
+        };
+        &self.draws.get_or_init(first).draws
     }
 }
 
@@ -64,8 +88,9 @@ impl View<'_> {
     /// Draws that the eye has in view, by bucket, in drawing order. The host finds them when a view asks for the first time, which takes time
     /// by the number of draws.
     pub fn visible(&self) -> &DrawsInOrder {
-        let choose = || self.query(None).choose(&self.scene.bucket_first, &self.placed.infos);
-        self.choice.draws.get_or_init(choose)
+        self.choice.chosen(|Chosen { draws, words }| {
+            self.query(None).choose_into(&self.scene.bucket_first, &self.placed.infos, (draws, words));
+        })
     }
 
     /// What decides which draws the eye needs, of which only those that may reach some rows of the image where there are any.
@@ -95,7 +120,7 @@ type Fill = dyn Fn(&View<'_>, &mut [u8]) + Send + Sync;
 /// What an input changes with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ChangesWith {
-    /// The camera, and where surfaces stand.
+    /// The camera, where surfaces stand, and what the frame before showed.
     Camera,
     /// Where surfaces stand, alone.
     Pose,
@@ -140,6 +165,7 @@ pub struct ViewInputs {
     inputs: RefCell<Vec<ViewInput>>,
     scripts: RefCell<Vec<ViewScript>>,
     holds_for_one_view: Cell<bool>,
+    asks_for_records_before: Cell<bool>,
 }
 
 impl ViewInputs {
@@ -186,7 +212,7 @@ impl ViewInputs {
         let stream =
             self.declare(device, graph, named, how, |view, bytes| put(bytes, 0, &view.placed.records))?;
         // A record of four texels is as long as in the stream.
-        let named = ("scene draw records", BufferRole::Scene);
+        let named = (("scene draw records", BufferRole::Scene), ChangesWith::Pose);
         let records = self.declare_like(device, graph, named, &scene.draw_data, |view, bytes| {
             put(bytes, 0, &view.placed.records);
         })?;
@@ -204,9 +230,33 @@ impl ViewInputs {
         scene: &SceneGpu,
     ) -> Result<ImageHandle, TechniqueError> {
         let named = ("scene draw bounds", BufferRole::Scene);
-        self.declare_like(device, graph, named, &scene.draw_bounds, |view, bytes| {
+        self.declare_like(device, graph, (named, ChangesWith::Pose), &scene.draw_bounds, |view, bytes| {
             put(bytes, 0, &view.placed.draw_bounds);
         })
+    }
+
+    /// Where the draws of a scene stood in the frame before, as an image of records, for each frame of a scene that moves.
+    ///
+    /// # Errors
+    /// The device.
+    pub fn declare_records_before(
+        &self,
+        device: &gpu::Device,
+        graph: &mut Graph,
+        scene: &SceneGpu,
+    ) -> Result<ImageHandle, TechniqueError> {
+        self.asks_for_records_before.set(true);
+        let named = ("scene draw records before", BufferRole::Scene);
+        let how = (named, ChangesWith::Camera);
+        self.declare_like(device, graph, how, &scene.draw_data, |view, bytes| {
+            let before = view.time.before.as_ref().and_then(|before| before.records.as_deref());
+            put(bytes, 0, before.unwrap_or(&view.placed.records));
+        })
+    }
+
+    /// Whether some input holds where draws stood in the frame before.
+    pub fn asks_for_records_before(&self) -> bool {
+        self.asks_for_records_before.get()
     }
 
     /// Records and spheres of lights, for each pose.
@@ -219,22 +269,22 @@ impl ViewInputs {
         graph: &mut Graph,
         lights: &SceneLights,
     ) -> Result<(ImageHandle, ImageHandle), TechniqueError> {
-        let named = ("lights", BufferRole::Lights);
+        let named = (("lights", BufferRole::Lights), ChangesWith::Pose);
         let data = self
             .declare_like(device, graph, named, &lights.data, |view, bytes| view.lights.fill_data(bytes))?;
-        let named = ("light spheres", BufferRole::Lights);
+        let named = (("light spheres", BufferRole::Lights), ChangesWith::Pose);
         let spheres = self.declare_like(device, graph, named, &lights.spheres, |view, bytes| {
             view.lights.fill_spheres(bytes)
         })?;
         Ok((data, spheres))
     }
 
-    /// An image of records like another one, filled for each pose.
+    /// An image of records like another one.
     fn declare_like(
         &self,
         device: &gpu::Device,
         graph: &mut Graph,
-        (name, role): (&str, BufferRole),
+        ((name, role), changes_with): ((&str, BufferRole), ChangesWith),
         like: &gpu::Image,
         fill: impl Fn(&View<'_>, &mut [u8]) + Send + Sync + 'static,
     ) -> Result<ImageHandle, TechniqueError> {
@@ -251,11 +301,7 @@ impl ViewInputs {
         })?;
         let handle = graph.import_image(name, role, &image, vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL);
         let target = FrameInput::Image(image);
-        self.inputs.borrow_mut().push(ViewInput {
-            target,
-            changes_with: ChangesWith::Pose,
-            fill: Box::new(fill),
-        });
+        self.inputs.borrow_mut().push(ViewInput { target, changes_with, fill: Box::new(fill) });
         Ok(handle)
     }
 
@@ -314,7 +360,8 @@ impl Frame<'_> {
         self.inputs.declare(self.device, graph, named, how, fill)
     }
 
-    /// As [`Frame::table`], of words that the view decides: at most `most_words`, of which `words` gives the first.
+    /// As [`Frame::table`], of words that the view decides: at most `most_words`, of which `words` puts the first into an empty list, whose
+    /// memory is used again.
     ///
     /// # Errors
     /// The device.
@@ -323,11 +370,17 @@ impl Frame<'_> {
         graph: &mut Graph,
         named: (&str, BufferRole),
         most_words: usize,
-        words: impl Fn(&View<'_>) -> Vec<u32> + Send + Sync + 'static,
+        words: impl Fn(&View<'_>, &mut Vec<u32>) + Send + Sync + 'static,
     ) -> Result<BufferHandle, TechniqueError> {
         let usage = vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::INDIRECT_BUFFER;
         let how = (4 * most_words.max(1) as u64, usage, ChangesWith::Camera);
-        self.input(graph, named, how, move |view, bytes| put(bytes, 0, &words(view)))
+        let kept = Mutex::new(Vec::new());
+        self.input(graph, named, how, move |view, bytes| {
+            let mut list = kept.lock().unwrap_or_else(PoisonError::into_inner);
+            list.clear();
+            words(view, &mut list);
+            put(bytes, 0, &list);
+        })
     }
 
     /// Lets `steps` choose the draws of a pass for each view, among those that it declares.

@@ -22,10 +22,11 @@ mod settings;
 mod slots;
 pub mod sort_words;
 mod technique;
+mod time;
 pub mod upload;
 pub mod views;
 
-pub use board::{Board, OpaqueDepth, SceneInput, SurfaceNormals, TriangleIds, VisitsAllLights};
+pub use board::{Board, OpaqueDepth, SceneInput, SurfaceNormals, TriangleIds, Velocity, VisitsAllLights};
 pub use camera_view::CameraView;
 pub use capacity::Counter;
 pub use draws::{Cull, CullOn, DrawOrder, DrawParams};
@@ -47,5 +48,6 @@ pub use technique::{
     ANY_SAMPLES, Answers, AppendixA, Approximation, Condition, Exactness, Info, MULTIPLE_SAMPLES, Need,
     Source, Technique, completed, exactness_of, params_of, set_param,
 };
+pub use time::{BEFORE_HISTORY, BEFORE_VIEW, FrameTime, ViewBefore};
 pub use upload::put;
 pub use views::LightPairs;

@@ -68,6 +68,9 @@ pub const LIGHT_PAIRS: &[&str] = &[LIGHT_COUNT, LIGHT_ERROR];
 /// The cells, tiles or clusters, that surfaces find their lights by: a colour each; white is a surface that none holds.
 pub const CLUSTERS: &str = "clusters";
 
+/// How far the surface of each pixel has moved on screen since the frame before, in frames of a flight; of any technique.
+pub const VELOCITY: &str = "velocity";
+
 /// What one pair adds to the image; twin: `include/light_pairs.glsl`.
 pub const LIGHT_PAIR: f64 = 1.0 / 1024.0;
 

@@ -73,14 +73,15 @@ impl Device {
     /// clone is dropped. What was not enabled is a feature that the device lacks ([`Device::features`]), though the hardware may have it.
     /// Of `options` the folder of the pipeline cache counts, and what tests do without; the program validates for itself.
     ///
-    /// Afterlight submits to the queue from inside its own calls, never from a thread of its own: when a scene is uploaded, a technique is
-    /// prepared, a frame is planned anew. A queue may be used by one thread at a time. So either all of these calls come from the thread
-    /// that submits the program's own work, or the program submits and presents within [`Device::with_queue`].
+    /// Afterlight submits to the queue from inside its own calls: when a scene is uploaded, a technique is prepared, a frame is planned anew.
+    /// A thread of its own submits only where the program asks for plans on another thread (`Renderer::fly_ahead`, `Embedded::plan_ahead`,
+    /// `Flight::plan_ahead`). A queue may be used by one thread at a time. So either all calls come from the thread that submits the program's
+    /// own work and none asks for such plans, or the program submits and presents within [`Device::with_queue`].
     ///
     /// # Safety
     /// - All handles belong together, `queue` is one of `queue_family`, `extensions` and `features` are what `device` was opened with.
     /// - Device and instance live until the last clone of the device and the last resource of it are dropped.
-    /// - No other thread uses the queue while one is in a call of Afterlight that submits, see above.
+    /// - No other thread uses the queue while one is in a call of Afterlight that submits, or while a thread of Afterlight's plans, see above.
     ///
     /// # Errors
     /// [`GpuError::MissingFeature`] names each thing that every technique needs and that the device lacks or was opened without.
@@ -107,6 +108,11 @@ impl Device {
             },
             options,
         )
+    }
+
+    /// Whether another program opened the device.
+    pub fn is_adopted(&self) -> bool {
+        self.0.is_adopted
     }
 
     /// Calls `with` with the queue while nobody else of this process submits to it by way of this device: a program that has adopted a

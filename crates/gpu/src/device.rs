@@ -46,7 +46,7 @@ pub(crate) struct DeviceInner {
     pub queue_family: u32,
     without_float_stencil: bool,
     /// Whether another program owns device and instance.
-    is_adopted: bool,
+    pub is_adopted: bool,
     queue: Mutex<Queue>,
     /// Counts submissions: its value is the number of the last one that is done, and all before it are.
     timeline: vk::Semaphore,
@@ -300,9 +300,9 @@ impl Device {
 
 /// Turns the result of `call` into an error; a lost device names `pass`.
 pub(crate) fn lost(call: &'static str, pass: &str) -> impl FnOnce(vk::Result) -> GpuError {
-    let pass = pass.to_owned();
+    // Owned where there is an error alone: calls of every frame come by here.
     move |result| match result {
-        vk::Result::ERROR_DEVICE_LOST => GpuError::DeviceLost { pass },
+        vk::Result::ERROR_DEVICE_LOST => GpuError::DeviceLost { pass: pass.to_owned() },
         result => GpuError::Vulkan { call, result },
     }
 }

@@ -742,6 +742,21 @@ impl Encoder {
         self.keep_image(image);
     }
 
+    /// Clears depth images outside a pass, and their stencils, to zero; `layout` is `TRANSFER_DST_OPTIMAL` or `GENERAL`.
+    pub fn clear_depth_image(
+        &mut self,
+        image: &Image,
+        layout: vk::ImageLayout,
+        range: vk::ImageSubresourceRange,
+    ) {
+        let zero = vk::ClearDepthStencilValue::default();
+        // SAFETY: as in `barriers`.
+        unsafe {
+            self.raw().cmd_clear_depth_stencil_image(self.commands, image.0.raw, layout, &zero, &[range]);
+        }
+        self.keep_image(image);
+    }
+
     /// Opens a label: what follows belongs to the pass `name`, in captures and where the device is lost.
     pub fn begin_label(&mut self, name: &str) {
         if let Some(debug) = &self.device.0.debug {

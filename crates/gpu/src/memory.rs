@@ -393,6 +393,11 @@ impl Device {
         found.or_else(|| candidates.clone().find(local)).or_else(|| candidates.next()).map(|i| i as u32)
     }
 
+    /// Things that hold the device open: clones of it, its resources, recordings and all else that was made of it and is not dropped yet.
+    pub fn held_objects(&self) -> usize {
+        Arc::strong_count(&self.0)
+    }
+
     /// Bytes that buffers, images and heaps of this device hold at the moment, as they asked for them; an allocator's unused room is left out.
     pub fn held_bytes(&self) -> u64 {
         self.0.held_bytes.load(Ordering::Relaxed)

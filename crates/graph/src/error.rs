@@ -141,6 +141,24 @@ pub enum GraphError {
         /// The resource.
         resource: String,
     },
+    /// A pass writes what the frame before wrote.
+    #[error("pass {pass}: writes {resource:?}, which is what the frame before wrote; expected reads alone")]
+    WritesBefore {
+        /// The pass.
+        pass: String,
+        /// The resource.
+        resource: String,
+    },
+    /// A pass reads of the frame before what no frame writes.
+    #[error("pass {pass}: reads {resource:?}, found no pass that writes that part of {now:?}; expected one")]
+    NeverWritten {
+        /// The pass.
+        pass: String,
+        /// What it reads.
+        resource: String,
+        /// The version that a pass should write.
+        now: String,
+    },
     /// One pass uses one part of a resource in two ways that exclude each other.
     #[error("pass {pass}: uses {resource:?} as {first} and as {second} at once; expected one of them")]
     Conflict {

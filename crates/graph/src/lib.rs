@@ -5,6 +5,18 @@
 //! in memory. The executor makes what a plan needs once and runs it any number of times, and reports time, statistics
 //! and bytes of everything.
 //!
+//! What a frame keeps for the next one has history: two versions that take turns, without a copy. Both live for the whole frame; a plan that
+//! takes the place of another one goes on with them ([`Executor::after`]).
+//! ```
+//! use afterlight_graph::{BufferRole, Graph, PassRole};
+//! let mut graph = Graph::new();
+//! let counts = graph.history_buffer("counts", BufferRole::Counters, 64);
+//! let now = graph.copy_buffer("go on", PassRole::Upkeep, &counts.before, counts.now);
+//! let told = graph.buffer("told", BufferRole::Counters, 64);
+//! let told = graph.copy_buffer("tell", PassRole::Upkeep, &now, told);
+//! graph.keep(&told);
+//! ```
+//!
 //! Every pass, buffer and image says what it is for where it is declared:
 //! ```
 //! use afterlight_graph::{BufferRole, Graph, PassRole};
@@ -38,11 +50,12 @@ pub use afterlight_roles::{BufferRole, PassRole, PassWork};
 
 pub use declare::{
     Blend, BlendEquation, BufferHandle, Commands, ComputePass, ConstantBits, DepthTest, Draw, DrawCall,
-    Graph, Handle, ImageHandle, ImageInfo, Load, RasterPass, RasterState, Rect, ResourceId, ScriptId,
-    StencilFace, StencilTest, Step, Subresource, VertexAttribute, VertexLayout, VertexStream,
+    Graph, Handle, History, ImageHandle, ImageInfo, Load, RasterPass, RasterState, Rect, ResourceId,
+    ScriptId, StencilFace, StencilTest, Step, Subresource, Version, VertexAttribute, VertexLayout,
+    VertexStream,
 };
 pub use error::GraphError;
-pub use execute::{Executor, FrameInput, FrameSlot, FrameTimes, ResourceKey};
+pub use execute::{Executor, FrameInput, FrameSlot, FrameTimes, KeptHistory, ResourceKey, Turn};
 pub use plan::{
     Access, Barrier, MemoryNeed, Placement, Plan, PlannedHeap, PlannedPass, PlannedResource, Requirements,
     Traffic,

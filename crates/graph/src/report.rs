@@ -34,6 +34,8 @@ pub struct ResourceReport {
     pub shared: bool,
     /// Whether it is the final colour target, which the technique's bytes leave out.
     pub output: bool,
+    /// Whether it is a version of a resource with history.
+    pub is_history: bool,
 }
 
 /// What one run of a frame took.
@@ -53,6 +55,8 @@ pub struct FrameReport {
     pub peak_bytes: u64,
     /// Bytes of all resources but the final colour target and what is shared, each counted in full.
     pub technique_bytes: u64,
+    /// Bytes of resources with history, both versions of each, which live for the whole frame.
+    pub history_bytes: u64,
 }
 
 impl FrameReport {

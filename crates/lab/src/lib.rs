@@ -33,6 +33,7 @@ mod session;
 mod setup;
 pub mod spec;
 mod trial;
+mod turns;
 pub mod verify;
 
 pub use chosen::{Chosen, choose, technique};

@@ -180,7 +180,7 @@ impl Session {
 
     /// The same scene seen by another camera.
     fn look(self, camera: Camera) -> Result<Session, LabError> {
-        let name = camera.name.clone();
+        let name = camera.name.to_string();
         let (renderer, workload) = self.with_settings(|settings| settings.camera = camera)?;
         Ok(Session { renderer, workload, camera: name, ..self })
     }
@@ -230,7 +230,7 @@ impl Session {
         let workload = afterlight_predict::of_view(scene.instances.len() as f64, vertices, &settings);
         let mut warnings = scene.warnings.clone();
         warnings.extend(on_device.warnings.iter().cloned());
-        let camera = settings.camera.name.clone();
+        let camera = settings.camera.name.to_string();
         let renderer = Renderer::with_scene(device, Arc::clone(&on_device), &settings)?;
         warnings.extend(renderer.warnings());
         let info = device.info();

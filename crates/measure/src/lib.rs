@@ -9,7 +9,7 @@ mod record;
 mod stats;
 mod verification;
 
-pub use play::{CapacityEvent, HITCH_FACTOR, Hitch, Play, PlayMemory, Played};
+pub use play::{CapacityEvent, HITCH_FACTOR, Held, Hitch, PlanEvent, Play, PlayMemory, Played};
 pub use record::{
     Buffer, CostRecord, Counters, DeviceRecord, Difference, Memory, PSNR_IDENTICAL_DB, Pass, ProcessRecord,
     Run, RunResult, SCHEMA, SceneRecord, SettingsRecord, Status,

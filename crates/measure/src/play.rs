@@ -37,8 +37,34 @@ pub struct Play {
     pub capacity_events: Vec<CapacityEvent>,
     /// Frames that dropped something for want of room.
     pub fell_short: Vec<u64>,
-    /// Memory of all techniques, which were prepared at once.
+    /// Larger plans that were made on another thread while frames went on.
+    pub plans: Vec<PlanEvent>,
+    /// Memory of all techniques, which were prepared at once; where sizes or samples change, of the last turn.
     pub memory: PlayMemory,
+    /// What the process held before the first frame, at the beginning of each further round of turns, and after the last frame.
+    pub held: Vec<Held>,
+}
+
+/// A larger plan that was made on another thread.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct PlanEvent {
+    /// The frame whose counters asked for it; none where it followed a plan that frames had outgrown by the time that it was ready.
+    pub begun: Option<u64>,
+    /// The first frame that was drawn with it; none where it was not ready before the last frame.
+    pub taken: Option<u64>,
+}
+
+/// What a process holds at one time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Held {
+    /// The frame before which it was counted.
+    pub frame: u64,
+    /// Bytes of buffers, images and heaps on the device.
+    pub device_bytes: u64,
+    /// Resources, recordings and other objects of the device.
+    pub device_objects: u64,
+    /// Resident memory of the process, where the system tells.
+    pub host_bytes: Option<u64>,
 }
 
 /// A frame is a hitch where it takes more than this many times the median of its neighbours.

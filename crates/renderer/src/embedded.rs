@@ -8,7 +8,7 @@ use afterlight_frame::{Params, Technique, TechniqueError};
 
 /// A technique that draws into another program's command buffers. It submits no frame and waits for none: the program does, and says when
 /// the device is done ([`Embedded::done`]).
-pub struct Embedded<'r>(Flight<'r>);
+pub struct Embedded(Flight);
 
 impl Renderer {
     /// Prepares a technique to draw into another program's command buffers, the first frame through `camera`. With `scene_moves` frames may
@@ -17,21 +17,26 @@ impl Renderer {
     ///
     /// # Errors
     /// As [`Renderer::prepare`].
-    pub fn embed<'r>(
-        &'r self,
-        technique: &'r dyn Technique,
+    pub fn embed(
+        &self,
+        technique: &'static dyn Technique,
         params: &Params,
         camera: &Camera,
         scene_moves: bool,
-    ) -> Result<Embedded<'r>, TechniqueError> {
-        let options = FlightOptions { shortfall: Shortfall::Tell, scene_moves, ..FlightOptions::default() };
+    ) -> Result<Embedded, TechniqueError> {
+        let options = FlightOptions {
+            shortfall: Shortfall::Tell,
+            scene_moves,
+            plans_ahead: false,
+            ..FlightOptions::default()
+        };
         Ok(Embedded(self.fly_for(technique, params, camera, options, true)?))
     }
 }
 
-impl Embedded<'_> {
+impl Embedded {
     /// Adds a frame to the caller's commands and a copy of its picture, of the size of the renderer's settings, to the caller's image.
-    /// Numbers of frames rise. Frames wait for what was recorded before them in the queue's order, and all that follows waits for the
+    /// Numbers of frames rise. Command buffers are submitted in the order in which frames were added: each may read what the one before left. Frames wait for what was recorded before them in the queue's order, and all that follows waits for the
     /// picture. How many are recorded before the first is done is the caller's choice; each holds its own inputs ([`Flight::bytes`]).
     ///
     /// # Errors
@@ -47,8 +52,9 @@ impl Embedded<'_> {
     }
 
     /// The device is done with the command buffers of all frames up to number `index`, or they will never be submitted: hands these frames
-    /// to `done`, in their order. A frame that fell short of room says so ([`Done::fell_short`]); lists that had none, or hardly any, have
-    /// more of it in frames that are recorded from now on. That is a plan on this thread, which submits to the queue.
+    /// to `done`, in their order. The frame after such ones is a [cut](FrameContext::cut): they have left it nothing. A frame that fell short of
+    /// room says so ([`Done::fell_short`]); lists that had none, or hardly any, have more of it in frames that are recorded from now on. That is
+    /// a plan on this thread, which submits to the queue, or on another one ([`Self::plan_ahead`]).
     ///
     /// # Errors
     /// The device, a plan that is larger than its memory; those of `done`.
@@ -58,6 +64,11 @@ impl Embedded<'_> {
         done: &mut dyn FnMut(&Done<'_>) -> Result<(), TechniqueError>,
     ) -> Result<(), TechniqueError> {
         self.0.done_by_caller(index, done)
+    }
+
+    /// See [`Flight::plan_ahead`].
+    pub fn plan_ahead(&mut self) {
+        self.0.plan_ahead();
     }
 
     /// See [`Flight::moves_without_plans`].

@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
-use crate::flight::ScenePose;
+use crate::pose::ScenePose;
 use afterlight_graph::{Executor, FrameInput, FrameReport, ResourceId, gpu};
 use afterlight_scene::{Camera, Light, ShapePose};
 
 use afterlight_frame::{
-    CameraView, DrawParams, LightPairs, SceneLights, Settings, TechniqueError, View, ViewChoice, ViewInput,
-    ViewInputs, ViewScript,
+    CameraView, DrawParams, FrameTime, LightPairs, SceneLights, Settings, TechniqueError, View, ViewBefore,
+    ViewChoice, ViewInput, ViewInputs, ViewScript,
     capacity::{Capacities, Counter, Demand},
     scene::{
         SceneGpu,
@@ -41,7 +41,7 @@ pub(crate) struct Kept {
 #[derive(Default)]
 pub(crate) struct Moved {
     pub placed: Option<Box<Placed>>,
-    pub lights: Option<Arc<SceneLights>>,
+    pub lights: Option<Box<SceneLights>>,
 }
 
 /// What a frame shows: all from which its inputs are computed.
@@ -54,6 +54,8 @@ pub(crate) struct Viewed {
     pub moved: Moved,
     /// Counts the poses so far.
     pub pose: u64,
+    /// When it is.
+    pub time: FrameTime,
 }
 
 impl Viewed {
@@ -66,8 +68,8 @@ impl Viewed {
         options: DrawParams,
     ) -> Self {
         let camera = CameraView::fitted(settings, moved.placed.as_deref().unwrap_or(&scene.rest));
-        let choice = ViewChoice::new(options);
-        Self { settings: settings.clone(), camera, choice, moved, pose: 0, scene, lights }
+        let (choice, time) = (ViewChoice::new(options), FrameTime::default());
+        Self { settings: settings.clone(), camera, choice, moved, pose: 0, time, scene, lights }
     }
 
     /// Looks through another camera.
@@ -91,13 +93,15 @@ impl Viewed {
         }
         self.pose += 1;
         let lights = pose.and_then(|pose| pose.lights.as_deref());
-        self.moved.lights = match lights {
-            None => None,
+        match lights {
+            None => self.moved.lights = None,
             Some(lights) => {
-                let moved = self.lights.moved(lights);
-                Some(Arc::new(moved.ok_or(TechniqueError::OtherLights { expected: self.lights.count })?))
+                let moved = self.moved.lights.get_or_insert_with(|| Box::new((*self.lights).clone()));
+                if !moved.set(lights) {
+                    return Err(TechniqueError::OtherLights { expected: self.lights.count });
+                }
             }
-        };
+        }
         let lights = lights.unwrap_or(rest_lights);
         self.settings.lights.clear();
         self.settings.lights.extend_from_slice(lights);
@@ -132,6 +136,17 @@ impl Viewed {
             lights: self.moved.lights.as_deref().unwrap_or(&self.lights),
             choice: &self.choice,
             placed: self.placed(),
+            time: &self.time,
+        }
+    }
+
+    /// Writes what it shows, for the frame after it; with where draws stand if that frame asks.
+    pub fn write_as_before(&self, with_records: bool, before: &mut ViewBefore) {
+        before.clip_from_world = self.camera.clip_from_world;
+        if with_records {
+            before.records.get_or_insert_default().clone_from(&self.placed().records);
+        } else {
+            before.records = None;
         }
     }
 }
@@ -157,8 +172,10 @@ pub struct Prepared {
     /// Whether the inputs and scripts are all that depends on the view.
     pub(crate) shows_all_views: bool,
     pub(crate) capacities: Capacities,
-    pub(crate) demands: Vec<Demand>,
+    pub(crate) demands: Arc<[Demand]>,
     pub(crate) kept: Kept,
+    /// Whether frames ask where draws stood in the frame before.
+    pub(crate) asks_for_records_before: bool,
     /// Draws in view.
     pub draw_calls: u32,
 }
@@ -173,8 +190,9 @@ impl Prepared {
         kept: Kept,
         draw_calls: u32,
     ) -> Result<Self, TechniqueError> {
+        let asks_for_records_before = inputs.asks_for_records_before();
         let (inputs, scripts, shows_all_views) = inputs.into_parts();
-        let demands = capacities.demands();
+        let demands = capacities.demands().into();
         let device = device.clone();
         let mut prepared = Self {
             device,
@@ -186,6 +204,7 @@ impl Prepared {
             capacities,
             demands,
             kept,
+            asks_for_records_before,
             draw_calls,
         };
         prepared.fill_inputs()?;

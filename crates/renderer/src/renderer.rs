@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use afterlight_graph::{
-    BufferRole, Executor, Graph, ImageHandle, ResourceId,
+    BufferRole, Executor, Graph, ImageHandle, KeptHistory, ResourceId,
     gpu::{self, vk},
 };
 use afterlight_scene::{Camera, Scene};
@@ -28,7 +28,7 @@ use afterlight_stages::{
     },
     lights::volumes,
     shared::{cull::SceneOfDraws, deform, indirect, shadow},
-    views::{light_pair_colors, of as technique_views},
+    views::{light_pair_colors, of as technique_views, velocity_colors},
 };
 
 /// Times that a view is recorded at most until everything that can overflow has room.
@@ -47,9 +47,12 @@ pub(crate) struct Recipe<'a> {
     pub moves: bool,
     /// Whether surfaces and lights may move then.
     pub scene_moves: bool,
+    /// Whose history the frame goes on with, where it has the same.
+    pub earlier: Option<&'a KeptHistory>,
 }
 
-/// A scene on a device with a view of it: prepares techniques to run.
+/// A scene on a device with a view of it: prepares techniques to run. Clones share what is on the device.
+#[derive(Clone)]
 pub struct Renderer {
     device: gpu::Device,
     scene: Arc<SceneGpu>,
@@ -94,6 +97,22 @@ impl Renderer {
             volume_indices,
             extra_shaders: Vec::new(),
         })
+    }
+
+    /// A renderer of the same scene and shaders with other settings. Lights that stay are shared, so that another size costs no upload.
+    ///
+    /// # Errors
+    /// As [`Renderer::new`].
+    pub fn with_settings(&self, settings: Settings) -> Result<Self, TechniqueError> {
+        check_size(&self.device, &settings)?;
+        let mut other = self.clone();
+        if settings.lights != self.settings.lights {
+            let mut uploader = self.device.uploader()?;
+            other.lights = Arc::new(SceneLights::new(&self.device, &mut uploader, &settings.lights)?);
+            uploader.finish()?;
+        }
+        other.settings = settings;
+        Ok(other)
     }
 
     /// Adds shaders of techniques from outside this crate; their names come before the built-in ones.
@@ -166,8 +185,8 @@ impl Renderer {
     ) -> Result<Prepared, TechniqueError> {
         self.check(technique)?;
         self.check_tessellation(technique)?;
-        let recipe =
-            Recipe { technique, params: &completed(technique, params), moves: false, scene_moves: false };
+        let params = &completed(technique, params);
+        let recipe = Recipe { technique, params, moves: false, scene_moves: false, earlier: None };
         self.prepare_recipe(&recipe, &self.settings, also)
     }
 
@@ -281,7 +300,7 @@ impl Renderer {
         capacities: Capacities,
         also: &impl Fn(&mut Graph, &ImageHandle),
     ) -> Result<Prepared, TechniqueError> {
-        let Recipe { technique, params, moves, scene_moves } = *recipe;
+        let Recipe { technique, params, moves, scene_moves, earlier } = *recipe;
         let options = *params.typed::<DrawParams>();
         let viewed = Viewed::new(settings, self.scene.clone(), self.lights.clone(), moved, options);
         let view = viewed.view();
@@ -324,6 +343,7 @@ impl Renderer {
         let hdr_id = (settings.keep_hdr || counts_pairs).then(|| graph.keep(&hdr));
         let shown = match counts_pairs {
             true => light_pair_colors(&mut graph, &frame, &hdr)?,
+            false if frame.shows(views::VELOCITY) => velocity_colors(&mut graph, &frame)?,
             false => hdr,
         };
         let final_color =
@@ -331,7 +351,7 @@ impl Renderer {
         let final_color = graph.keep(&final_color);
         drop(frame);
         let plan = graph.plan(&self.device)?;
-        let executor = Executor::new(&self.device, plan)?;
+        let executor = Executor::after(&self.device, plan, earlier)?;
         let kept = Kept {
             hdr: hdr_id.filter(|_| settings.keep_hdr),
             depth,
@@ -359,7 +379,8 @@ impl Renderer {
             (size_of::<FrameConstants>() as u64, vk::BufferUsageFlags::UNIFORM_BUFFER, ChangesWith::Camera),
             |view, bytes| {
                 let bounds_ws = view.bounds_ws();
-                put(bytes, 0, &[view.camera.constants(view.settings, view.lights, &bounds_ws)]);
+                let of_view = view.camera.constants(view.settings, view.lights, &bounds_ws);
+                put(bytes, 0, &[view.time.constants(of_view)]);
             },
         )?;
         let (stream, records) = match alive {

@@ -33,7 +33,7 @@ pub fn select(scene: &Scene, spec: Option<&str>) -> Result<Camera, SceneError> {
     let Some(spec) = spec else {
         return Ok(scene.cameras.first().cloned().unwrap_or_else(|| default_camera(scene)));
     };
-    if let Some(camera) = scene.cameras.iter().find(|c| c.name == spec) {
+    if let Some(camera) = scene.cameras.iter().find(|c| &*c.name == spec) {
         return Ok(camera.clone());
     }
     if let Some(camera) = spec.parse().ok().and_then(|index: usize| scene.cameras.get(index)) {

@@ -257,8 +257,8 @@ pub enum Projection {
 /// A camera: looks along its −Z, +Y up.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Camera {
-    /// Name, as `--camera` takes it.
-    pub name: String,
+    /// Name, as `--camera` takes it; shared, since every frame has a camera and none should allocate for it.
+    pub name: Arc<str>,
     /// Camera to world, rigid.
     pub world_from_view: Affine3A,
     /// Projection.
@@ -528,13 +528,19 @@ impl Camera {
     }
 
     /// A perspective camera at `eye_ws` that looks at `target_ws`, +Y up (or +Z where it looks along Y).
-    pub fn look_at(name: &str, eye_ws: Vec3, target_ws: Vec3, fov_y_rad: f32, near_m: f32) -> Self {
+    pub fn look_at(
+        name: impl Into<Arc<str>>,
+        eye_ws: Vec3,
+        target_ws: Vec3,
+        fov_y_rad: f32,
+        near_m: f32,
+    ) -> Self {
         let forward = (target_ws - eye_ws).try_normalize().unwrap_or(Vec3::NEG_Z);
         let up = if forward.y.abs() > 0.9999 { Vec3::Z } else { Vec3::Y };
         let right = forward.cross(up).normalize();
         let up = right.cross(forward);
         Self {
-            name: name.to_owned(),
+            name: name.into(),
             world_from_view: Affine3A::from_cols(right.into(), up.into(), (-forward).into(), eye_ws.into()),
             projection: Projection::Perspective { fov_y_rad, near_m },
         }

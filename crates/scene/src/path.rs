@@ -364,7 +364,7 @@ impl CameraPath {
         if name == FLY_THROUGH {
             return Some(Self::fly_through(scene));
         }
-        let mut cameras = (0..scene.cameras.len()).filter(|&index| scene.cameras[index].name == name);
+        let mut cameras = (0..scene.cameras.len()).filter(|&index| *scene.cameras[index].name == *name);
         cameras.find_map(|index| Self::of_camera(scene, index))
     }
 
@@ -435,7 +435,7 @@ impl CameraPath {
         }
         let Some(span) = self.span(self.within(time_s)) else {
             let fov_y_rad = EXTERIOR_FOV_DEG.to_radians();
-            return Camera::look_at(&self.name, Vec3::ZERO, Vec3::NEG_Z, fov_y_rad, self.near_m);
+            return Camera::look_at(&*self.name, Vec3::ZERO, Vec3::NEG_Z, fov_y_rad, self.near_m);
         };
         let key = |k: usize| &self.keyframes[k];
         let relative = |point: [f64; 3]| DVec3::from_array(point) - self.origin_file;
@@ -444,7 +444,7 @@ impl CameraPath {
         let fov_deg = from.fov_deg + (to.fov_deg - from.fov_deg) * span.u as f32;
         let target = |k: usize| key(k).target_ws.map_or(DVec3::ZERO, relative);
         let target_ws = span.value(target).as_vec3();
-        let camera = Camera::look_at(&self.name, eye_ws, target_ws, fov_deg.to_radians(), self.near_m);
+        let camera = Camera::look_at(&*self.name, eye_ws, target_ws, fov_deg.to_radians(), self.near_m);
         if from.rotation.is_none() {
             return camera;
         }
@@ -488,6 +488,12 @@ impl CameraPath {
     /// Whether the view jumps between two times, so that what the frame at the first has kept is of no use to that at the second.
     pub fn is_cut_between(&self, from_s: f64, to_s: f64) -> bool {
         self.shot_at(from_s) != self.shot_at(to_s)
+    }
+
+    /// The same between two places as [`Self::at`] takes them, 0 the first keyframe and 1 the last. Beyond 1 a closed path goes round.
+    pub fn is_cut_between_places(&self, from: f64, to: f64) -> bool {
+        let time_s = |place: f64| self.start_s() + place * self.duration_s();
+        self.is_cut_between(time_s(from), time_s(to))
     }
 
     /// A time within the path's own: wrapped where it is closed.

@@ -194,14 +194,7 @@ impl Scene {
     }
 
     fn cameras_into(&self, file_from_nodes: &[DAffine3], out: &mut Vec<Camera>) {
-        // Names are strings: copied once.
-        if out.len() == self.cameras.len() && out.iter().zip(&self.cameras).all(|(a, b)| a.name == b.name) {
-            for (posed, camera) in out.iter_mut().zip(&self.cameras) {
-                (posed.world_from_view, posed.projection) = (camera.world_from_view, camera.projection);
-            }
-        } else {
-            out.clone_from(&self.cameras);
-        }
+        out.clone_from(&self.cameras);
         for attached in &self.camera_nodes {
             let node = file_from_nodes.get(attached.node as usize);
             let place = node.and_then(|&node| rigid(&self.world_from(node)));

@@ -91,7 +91,7 @@ fn the_colonnade_has_what_it_is_for() {
     assert!(any(&|m| m.emissive_factor[0] > 1.0));
     assert!(scene.instances.iter().any(|i| i.world_from_object.matrix3.determinant() < 0.0));
     for name in ["nave", "wall", "away"] {
-        assert!(scene.cameras.iter().any(|c| c.name == name), "{name}");
+        assert!(scene.cameras.iter().any(|c| &*c.name == name), "{name}");
     }
 }
 
@@ -168,7 +168,7 @@ fn moving_objects_move_and_come_back() {
 #[test]
 fn cameras_are_chosen_by_name_index_and_numbers() {
     let scene = colonnade_small();
-    let name = |spec: Option<&str>| camera::select(&scene, spec).map(|c| c.name);
+    let name = |spec: Option<&str>| camera::select(&scene, spec).map(|c| c.name.to_string());
     assert_eq!(name(None).expect("first"), "nave");
     assert_eq!(name(Some("aisle")).expect("by name"), "aisle");
     assert_eq!(name(Some("1")).expect("by index"), "axis");

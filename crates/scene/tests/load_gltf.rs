@@ -315,7 +315,7 @@ fn lights_and_cameras() {
     assert_eq!((scene.lights[1].kind, scene.lights[1].range_m), (LightKind::Directional, f32::INFINITY));
     let eye = &scene.cameras[0];
     assert_eq!(
-        (eye.name.as_str(), eye.projection),
+        (&*eye.name, eye.projection),
         ("eye", Projection::Perspective { fov_y_rad: 0.75, near_m: 0.125 })
     );
     let m = eye.world_from_view.matrix3;

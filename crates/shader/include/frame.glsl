@@ -23,7 +23,15 @@ struct FrameConstants {
     uint unbounded_light_count; // lights without an end, first in the list
     vec2 distance_range_m;      // nearest and farthest view distance that a surface of the scene can have, the first above 0
     uint samples;               // of a pixel
+    uint frame_index;           // modulo 2^32; 0 of a view alone
+    float time_s;               // of the scene; 0 of a view alone
+    uint before;                // what of the frame before is of use: BEFORE_VIEW, BEFORE_HISTORY
+    mat4 clip_from_world_before;    // of the frame before; this frame's where none was before
 };
+
+// Twins in crates/frame/src/time.rs.
+const uint BEFORE_VIEW = 1u;    // the frame before shows the same scene, and the camera has not jumped since
+const uint BEFORE_HISTORY = 2u; // resources with history hold what that frame wrote
 
 layout(set = 0, binding = 0, scalar) uniform FrameBlock {
     FrameConstants frame;

@@ -35,6 +35,18 @@ vec3 pairs_color(float count) {
     return heat(count < 1.0 ? count : 1.0 + log2(count) / 3.0);
 }
 
+// Hue: red to the right, then yellow, green down-left and so on, clockwise round to magenta up-right. Brightness: black 1/16 of a pixel and
+// less, full 64 pixels and more, logarithmic.
+vec3 velocity_color(vec2 velocity_px) {
+    float moved_px = length(velocity_px);
+    if (moved_px == 0.0) {
+        return vec3(0.0);
+    }
+    float turn = atan(velocity_px.y, velocity_px.x) / 6.283185307;
+    vec3 hue = clamp(abs(fract(turn + vec3(0.0, 2.0, 1.0) / 3.0) * 6.0 - 3.0) - 1.0, 0.0, 1.0);
+    return hue * clamp((log2(moved_px) + 4.0) / 10.0, 0.0, 1.0);
+}
+
 // Blue 1e-8 and less, green 1e-7, yellow 1e-6, red 1e-5, white 1e-4 and more.
 vec3 error_color(float error) {
     return heat(1.0 + log2(max(error, 1e-8) / 1e-8) / log2(10.0));

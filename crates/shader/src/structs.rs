@@ -31,6 +31,14 @@ shader_struct! {
         pub distance_range_m: [f32; 2],
         /// Samples of a pixel.
         pub samples: u32,
+        /// Number of the frame, modulo 2^32; 0 of a view alone.
+        pub frame_index: u32,
+        /// Time of the scene, s; 0 of a view alone.
+        pub time_s: f32,
+        /// What of the frame before is of use: `BEFORE_VIEW`, `BEFORE_HISTORY`; 0 after a cut.
+        pub before: u32,
+        /// World to clip of the frame before, columns; this frame's where none was before.
+        pub clip_from_world_before: [[f32; 4]; 4],
     }
 
     /// How indirect light is gathered from a reflective shadow map (`include/indirect.glsl`).

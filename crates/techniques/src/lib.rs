@@ -19,10 +19,11 @@
 
 pub use afterlight_cost as cost;
 pub use afterlight_frame::{
-    ANY_SAMPLES, Answers, AppendixA, Approximation, Board, Condition, Counter, Cull, CullOn, DrawOrder, DrawParams,
-    Effects, Exactness, Frame, Indirect, Info, LightPairs, MULTIPLE_SAMPLES, Need, ParamError, ParamInfo,
-    ParamKind, ParamSet, Params, Post, SceneGpu, SceneLights, Settings, Shadows, Source, Technique,
-    TechniqueError, Transparency, completed, device_order, exactness_of, params, params_of, set_param, views,
+    ANY_SAMPLES, Answers, AppendixA, Approximation, Board, Condition, Counter, Cull, CullOn, DrawOrder,
+    DrawParams, Effects, Exactness, Frame, Indirect, Info, LightPairs, MULTIPLE_SAMPLES, Need, ParamError,
+    ParamInfo, ParamKind, ParamSet, Params, Post, SceneGpu, SceneLights, Settings, Shadows, Source,
+    Technique, TechniqueError, Transparency, completed, device_order, exactness_of, params, params_of,
+    set_param, views,
 };
 pub use afterlight_graph as graph;
 pub use afterlight_scene as scene;

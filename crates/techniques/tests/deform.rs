@@ -199,7 +199,13 @@ fn flown(stage: &Stage, id: &str, settings: &Settings, poses: &[Arc<ScenePose>])
         Ok(())
     };
     for (index, pose) in (0..).zip(poses) {
-        let context = FrameContext { index, camera: camera.clone(), pose: Some(pose.clone()) };
+        let context = FrameContext {
+            index,
+            time_s: 0.25,
+            cut: false,
+            camera: camera.clone(),
+            pose: Some(pose.clone()),
+        };
         flight.frame(context, &mut done).unwrap_or_else(|e| panic!("{id}: {e}"));
     }
     flight.land(&mut done).unwrap_or_else(|e| panic!("{id}: {e}"));
@@ -266,7 +272,13 @@ fn poses_with_other_joints_are_refused() {
     let mut flight = renderer
         .fly(technique, &Params::default(), &settings.camera, options)
         .unwrap_or_else(|e| panic!("{e}"));
-    let context = FrameContext { index: 0, camera: settings.camera.clone(), pose: Some(Arc::new(pose)) };
+    let context = FrameContext {
+        index: 0,
+        time_s: 0.25,
+        cut: false,
+        camera: settings.camera.clone(),
+        pose: Some(Arc::new(pose)),
+    };
     let error = flight.frame(context, &mut |_| Ok(())).expect_err("is refused").to_string();
     assert!(error.contains("weights of morph targets"), "{error}");
 }

@@ -40,12 +40,18 @@ fn path(stage: &Stage, frames: u64) -> Vec<Camera> {
 
 /// Frames of a scene that stands still.
 fn still(cameras: &[Camera]) -> impl Iterator<Item = FrameContext> + '_ {
-    (0..).zip(cameras).map(|(index, camera)| FrameContext { index, camera: camera.clone(), pose: None })
+    (0..).zip(cameras).map(|(index, camera)| FrameContext {
+        index,
+        time_s: 0.25,
+        cut: false,
+        camera: camera.clone(),
+        pose: None,
+    })
 }
 
 /// Flies and returns pictures and events.
 fn flown(
-    flight: &mut Flight<'_>,
+    flight: &mut Flight,
     contexts: impl IntoIterator<Item = FrameContext>,
 ) -> (Vec<Rgba8Image>, Vec<Vec<Event>>) {
     let (mut pictures, mut events) = (Vec::new(), Vec::new());
@@ -173,11 +179,14 @@ fn a_view_that_needs_far_more_than_the_last_is_drawn_again_or_told() {
             Ok(())
         };
         for (index, camera) in (0..).zip(&cameras) {
-            let context = FrameContext { index, camera: camera.clone(), pose: None };
+            let context =
+                FrameContext { index, time_s: 0.25, cut: false, camera: camera.clone(), pose: None };
             flight.frame(context, &mut done).unwrap_or_else(|e| panic!("{id}: {e}"));
             // What a list needs shows only where those that it follows from have room, so it takes a frame each. Landing, not the device's
             // speed, says which frames know of which.
             flight.land(&mut done).unwrap_or_else(|e| panic!("{id}: {e}"));
+            // The plan with room is made on another thread.
+            flight.wait_for_plan().unwrap_or_else(|e| panic!("{id}: {e}"));
         }
         assert_eq!((short[0], short[2], short[6]), (false, true, false), "{id}: {short:?}");
     }
@@ -243,8 +252,13 @@ fn every_frame_of_a_scene_that_moves_is_the_picture_of_its_pose() {
             .unwrap_or_else(|e| panic!("{id}: {e}"));
         // The last frame is at rest again, as the first pose is.
         let moving = poses.iter().map(|pose| Some(pose.clone())).chain([None]);
-        let contexts =
-            (0..).zip(moving).map(|(index, pose)| FrameContext { index, camera: camera.clone(), pose });
+        let contexts = (0..).zip(moving).map(|(index, pose)| FrameContext {
+            index,
+            time_s: 0.25,
+            cut: false,
+            camera: camera.clone(),
+            pose,
+        });
         let (mut pictures, _) = flown(&mut flight, contexts);
         let at_rest = pictures.pop().expect("a last frame");
         let of_pose = |(stage, pose): (&Stage, &Arc<ScenePose>)| {
@@ -279,7 +293,13 @@ fn poses_that_do_not_fit_a_flight_are_told() {
         let mut flight = renderer
             .fly(technique, &Params::default(), &settings.camera, options)
             .unwrap_or_else(|e| panic!("{e}"));
-        let context = FrameContext { index: 0, camera: settings.camera.clone(), pose: Some(Arc::new(pose)) };
+        let context = FrameContext {
+            index: 0,
+            time_s: 0.25,
+            cut: false,
+            camera: settings.camera.clone(),
+            pose: Some(Arc::new(pose)),
+        };
         flight.frame(context, &mut |_| Ok(())).expect_err("is refused").to_string()
     };
     let good = pose_of(&stage, &settings.lights, 1);
@@ -362,7 +382,8 @@ fn handles_move_instances_and_lights() {
             renderer.fly(technique, &Params::default(), &settings.camera, options).expect("prepared");
         let camera = settings.camera.clone();
         let pose = Some(Arc::new(pose.clone()));
-        let (pictures, _) = flown(&mut flight, [FrameContext { index: 0, camera, pose }]);
+        let (pictures, _) =
+            flown(&mut flight, [FrameContext { index: 0, time_s: 0.25, cut: false, camera, pose }]);
         let mut alone = wanted_renderer.prepare(technique, &Params::default()).expect("prepared");
         alone.run().expect("drawn");
         let wanted = alone.final_rgba8().expect("read");

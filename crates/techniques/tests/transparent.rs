@@ -622,7 +622,7 @@ fn wrong_orders_of_the_device_are_caught() {
         (&keys, "view_distance_m(draw, triangle.centroid_os)", "view_distance_m(draw, vec3(0.0))"),
         (&count, "draw_commands[place * 5u] = 0u;", "draw_commands[place * 5u] = 3u;"),
         (&write, "draw_commands[at + 2u] = place * 3u;", "draw_commands[at + 2u] = place * 3u + 3u;"),
-        (&write, "if (ends_run(place)) {", "if (ends_run(place) && run > 0u) {"),
+        (&write, "(place + 1u) * 3u);", "place * 3u);"),
         (&write, "draw_count = all_runs;", "draw_count = all_runs - 1u;"),
     ] {
         let wrong = compiled_variant(shader, file, &[(from, to)]);

@@ -1,13 +1,15 @@
 //! A program with its own window, device and swapchain that draws its own triangle and Afterlight's view beside it.
 //!
-//! `embed [--frames N] [--technique ID] [--resize-every-frame] [--save FILE.png]`
+//! `embed [--frames N] [--technique ID] [--scene FILE] [--view NAME] [--resize-every-frame] [--save FILE.png]`
+//!
+//! A scene that has an animation plays, 30 frames a second of its time.
 
 mod engine;
 
-use std::time::Duration;
+use std::{sync::Arc, time::Duration};
 
 use afterlight_image::{Rgba8Image, write_png};
-use afterlight_renderer::{Done, Embedded, FrameContext, Renderer};
+use afterlight_renderer::{Done, Embedded, FrameContext, Renderer, ScenePose};
 use afterlight_techniques::{
     Params, Settings, find,
     graph::gpu::{Adopted, CallersCommands, Device, DeviceOptions, Target},
@@ -28,25 +30,35 @@ use winit::{
 struct Options {
     frames: u64,
     technique: String,
+    scene: String,
+    view: String,
     resize_every_frame: bool,
     save: Option<String>,
 }
 
 impl Options {
     fn parse() -> Result<Options, Error> {
-        let technique = "visibility".to_owned();
-        let mut options = Options { frames: u64::MAX, technique, resize_every_frame: false, save: None };
+        let mut options = Options {
+            frames: u64::MAX,
+            technique: "visibility".to_owned(),
+            scene: "builtin:spheres".to_owned(),
+            view: "final".to_owned(),
+            resize_every_frame: false,
+            save: None,
+        };
         let mut args = std::env::args().skip(1);
         while let Some(arg) = args.next() {
             let mut value = || args.next().ok_or(format!("{arg} lacks its value"));
             match arg.as_str() {
                 "--frames" => options.frames = value()?.parse()?,
                 "--technique" => options.technique = value()?,
+                "--scene" => options.scene = value()?,
+                "--view" => options.view = value()?,
                 "--save" => options.save = Some(value()?),
                 "--resize-every-frame" => options.resize_every_frame = true,
                 _ => {
                     return Err(format!(
-                        "found {arg}, expected --frames, --technique, --save or --resize-every-frame"
+                        "found {arg}, expected --frames, --technique, --scene, --view, --save or --resize-every-frame"
                     )
                     .into());
                 }
@@ -89,13 +101,15 @@ fn main() -> Result<(), Error> {
     // Dropped in the opposite order: what Afterlight made goes before the device, the device before the window.
     let mut engine = Engine::new(app.window.as_ref().ok_or("no window")?)?;
     let device = adopt(&mut engine)?;
-    let scene = scene::load_source("builtin:spheres", &scene::LoadOptions::default())?;
-    let settings = Settings::for_scene(&scene, HALF[0], HALF[1]);
+    let scene = scene::load_source(&options.scene, &scene::LoadOptions::default())?;
+    let settings = Settings { view: options.view.clone(), ..Settings::for_scene(&scene, HALF[0], HALF[1]) };
     let renderer = Renderer::new(&device, &scene, &settings)?;
     let technique = find(&options.technique).ok_or(format!("no technique {}", options.technique))?;
-    let mut view = renderer.embed(technique, &Params::default(), &settings.camera, false)?;
+    let mut view =
+        renderer.embed(technique, &Params::default(), &settings.camera, !scene.animations.is_empty())?;
 
-    let drawn = draw(&options, &mut events, &mut app, &mut engine, &mut view, &settings.camera);
+    let shown = Shown { scene: &scene, camera: &settings.camera };
+    let drawn = draw(&options, &mut events, &mut app, &mut engine, &mut view, &shown);
     // Also after an error, since the view holds what the device may still use.
     // SAFETY: one thread alone uses the device.
     unsafe { engine.device.device_wait_idle() }?;
@@ -127,14 +141,29 @@ fn adopt(engine: &mut Engine) -> Result<Device, Error> {
     Ok(unsafe { Device::adopt(&adopted, &DeviceOptions::default()) }?)
 }
 
+/// What the frames show.
+struct Shown<'a> {
+    scene: &'a scene::Scene,
+    camera: &'a Camera,
+}
+
+impl Shown<'_> {
+    fn frame(&self, index: u64) -> FrameContext {
+        let time_s = index as f64 / 30.0;
+        let pose = (!self.scene.animations.is_empty())
+            .then(|| Arc::new(ScenePose::of(self.scene, &self.scene.pose_at(time_s), false)));
+        FrameContext { index, time_s, cut: false, camera: self.camera.clone(), pose }
+    }
+}
+
 /// Draws frames until there are enough, and returns how many were shown.
 fn draw(
     options: &Options,
     events: &mut EventLoop<()>,
     app: &mut App,
     engine: &mut Engine,
-    view: &mut Embedded<'_>,
-    camera: &Camera,
+    view: &mut Embedded,
+    of: &Shown<'_>,
 ) -> Result<u64, Error> {
     let mut shown = 0;
     for round in 0..options.frames {
@@ -163,11 +192,7 @@ fn draw(
             let target = Target::new(engine.canvas, CANVAS_FORMAT, [HALF[0], 0], layouts);
             (CallersCommands::new(commands), target)
         };
-        view.frame(
-            FrameContext { index: shown, camera: camera.clone(), pose: None },
-            &commands_of_view,
-            &target,
-        )?;
+        view.frame(of.frame(shown), &commands_of_view, &target)?;
         engine.end(commands, image, shown)?;
         shown += 1;
     }

@@ -2,9 +2,10 @@
 
 use std::path::Path;
 use std::process::{Command, Output};
+use std::sync::Arc;
 
 use afterlight_image::{Rgba8Image, read_png};
-use afterlight_renderer::Renderer;
+use afterlight_renderer::{Done, FlightOptions, FrameContext, Renderer, ScenePose};
 use afterlight_techniques::{
     Params, Settings, find,
     graph::gpu::{Device, DeviceOptions},
@@ -83,4 +84,68 @@ fn a_window_that_is_resized_every_frame_goes_on() {
     let text = String::from_utf8_lossy(&output.stdout);
     let shown: u32 = text.split(' ').next().and_then(|n| n.parse().ok()).expect("a count of frames");
     assert!(shown > 60, "{text}");
+}
+
+/// A triangle whose one corner a morph target moves, as a glTF file.
+fn write_morphing(folder: &Path) -> std::path::PathBuf {
+    let floats: [f32; 22] = [
+        -1.0, -1.0, 0.0, 1.0, -1.0, 0.0, 0.0, 1.0, 0.0, // corners
+        0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.5, 0.4, 0.0, // how far the target moves them
+        0.0, 1.0, // times
+        0.0, 1.0, // weights
+    ];
+    let bytes: Vec<u8> = floats.iter().flat_map(|value| value.to_le_bytes()).collect();
+    std::fs::write(folder.join("morphing.bin"), bytes).expect("a file");
+    let json = r#"{"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+        "meshes": [{"weights": [0], "primitives": [{"attributes": {"POSITION": 0}, "targets": [{"POSITION": 1}]}]}],
+        "animations": [{"samplers": [{"input": 2, "output": 3}], "channels": [{"sampler": 0, "target": {"node": 0, "path": "weights"}}]}],
+        "buffers": [{"uri": "morphing.bin", "byteLength": 88}],
+        "bufferViews": [{"buffer": 0, "byteOffset": 0, "byteLength": 36}, {"buffer": 0, "byteOffset": 36, "byteLength": 36},
+            {"buffer": 0, "byteOffset": 72, "byteLength": 8}, {"buffer": 0, "byteOffset": 80, "byteLength": 8}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [-1, -1, 0], "max": [1, 1, 0]},
+            {"bufferView": 1, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [0.5, 0.4, 0]},
+            {"bufferView": 2, "componentType": 5126, "count": 2, "type": "SCALAR", "min": [0], "max": [1]},
+            {"bufferView": 3, "componentType": 5126, "count": 2, "type": "SCALAR"}]}"#;
+    let file = folder.join("morphing.gltf");
+    std::fs::write(&file, json).expect("a file");
+    file
+}
+
+/// What a frame keeps for the next one reaches it through another program's command buffers: velocities of a mesh that deforms, which follow
+/// from the positions that the frame before left.
+#[test]
+fn frames_find_what_the_one_before_left() {
+    const FRAMES: u64 = 6;
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = write_morphing(folder.path());
+    let (scene_file, canvas_file) = (file.to_str().expect("UTF-8"), folder.path().join("canvas.png"));
+    let save = canvas_file.to_str().expect("UTF-8");
+    let frames = FRAMES.to_string();
+    let args = ["--frames", &frames, "--technique", "forward", "--scene", scene_file, "--view", "velocity"];
+    run(&[&args[..], &["--save", save]].concat());
+    let found = half(&read_png(Path::new(save)).expect("a picture"), 1);
+
+    let device = Device::open(&DeviceOptions::default()).expect("a device");
+    let scene = scene::load_source(scene_file, &scene::LoadOptions::default()).expect("a scene");
+    let settings = Settings { view: "velocity".to_owned(), ..Settings::for_scene(&scene, HALF[0], HALF[1]) };
+    let renderer = Renderer::new(&device, &scene, &settings).expect("a renderer");
+    let options = FlightOptions { pictures: true, scene_moves: true, ..FlightOptions::default() };
+    let technique = find("forward").expect("a technique");
+    let mut flight =
+        renderer.fly(technique, &Params::default(), &settings.camera, options).expect("prepared");
+    let mut last = Vec::new();
+    let mut done = |frame: &Done<'_>| {
+        last = frame.rgba8.expect("asked for").to_vec();
+        Ok(())
+    };
+    for index in 0..FRAMES {
+        let time_s = index as f64 / 30.0;
+        let pose = Some(Arc::new(ScenePose::of(&scene, &scene.pose_at(time_s), false)));
+        let context = FrameContext { index, time_s, cut: false, camera: settings.camera.clone(), pose };
+        flight.frame(context, &mut done).expect("a frame");
+    }
+    flight.land(&mut done).expect("landed");
+    assert!(last.chunks_exact(4).any(|pixel| pixel[..3] != [0; 3]), "something moves");
+    assert!(found == last, "other velocities than on a device of its own");
 }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use afterlight_image::{Rgba8Image, write_png};
 use afterlight_lab::play::{PlaySpec, SeesPicture, play};
 use afterlight_lab::{Listener as _, Session, choose};
-use afterlight_measure::{Distribution, Play};
+use afterlight_measure::{Distribution, Held, Play};
 use afterlight_report::check_file;
 use afterlight_report::text::{grouped, table};
 
@@ -33,6 +33,8 @@ pub fn run(args: &PlayArgs) -> Result<(), Failure> {
         path_s: args.path_seconds,
         in_flight: args.in_flight,
         switch_every: args.switch_every,
+        sizes_px: args.sizes.clone(),
+        samples: args.samples_list.clone(),
     };
     how.check()?;
     let pattern = args.output.as_deref().map(Pattern::of).transpose()?;
@@ -142,6 +144,19 @@ fn text(played: &Play) -> String {
         grouped(played.memory.plan_bytes),
         grouped(played.memory.in_flight_bytes)
     );
+    if let [first, .., last] = &played.held[..] {
+        let at = |when: &str, held: &Held| {
+            let host = held.host_bytes.map_or_else(|| "—".to_owned(), grouped);
+            let [bytes, objects] = [held.device_bytes, held.device_objects].map(grouped);
+            format!("held {when}: {bytes} bytes in {objects} objects of the device, {host} bytes of the host")
+        };
+        let _ = writeln!(text, "{}", at("before the first frame", first));
+        let _ = writeln!(text, "{}", at("after the last", last));
+    }
+    tell(&mut text, "plans made while frames went on", &played.plans, |plan| {
+        let frame = |frame: Option<u64>| frame.map_or_else(|| "—".to_owned(), grouped);
+        format!("begun by frame {}, taken by frame {}", frame(plan.begun), frame(plan.taken))
+    });
     tell(&mut text, "hitches", &played.hitches, |hitch| {
         let causes = if hitch.causes.is_empty() { "unknown".to_owned() } else { hitch.causes.join(", ") };
         format!(

@@ -77,7 +77,7 @@ fn scene_json(source: &str, scene: &Scene) -> Value {
                     json!({ "kind": "orthographic", "half_height_m": half_height_m, "near_m": near_m, "far_m": far_m })
                 }
             };
-            json!({ "index": index, "name": camera.name, "eye_ws": [eye.x, eye.y, eye.z], "projection": projection })
+            json!({ "index": index, "name": &*camera.name, "eye_ws": [eye.x, eye.y, eye.z], "projection": projection })
         })
         .collect();
     let corner = |corner_ws| match bounds.is_empty() {

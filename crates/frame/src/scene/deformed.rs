@@ -1,5 +1,7 @@
 //! What skins and morph targets deform, on the device: shapes as the file has them, from which a pass writes the drawn vertices of each pose.
 
+use std::ops::Range;
+
 use afterlight_graph::gpu;
 use afterlight_scene::{Aabb, Scene, Shape, ShapePose};
 use afterlight_shader::structs::{DeformGroup, Deformed};
@@ -15,6 +17,8 @@ const NO_DIFFERENCES: u32 = u32::MAX;
 
 /// Shapes of a scene on the device.
 pub struct DeformedGpu {
+    /// From the first deformed vertex of the scene to the last.
+    pub vertices: Range<u32>,
     /// A [`DeformGroup`] each group of the pass.
     pub groups: gpu::Buffer,
     /// How many groups.
@@ -94,6 +98,7 @@ impl DeformedGpu {
         let mut upload = |name: &str, words: &[u32]| upload_slice(device, uploader, name, words);
         Ok(Some(Self {
             rest_bounds_os,
+            vertices: lists.vertices(),
             group_count: lists.groups.len() as u32,
             joint_count: scene.shaped.object_from_bind.len() as u32,
             weight_count: scene.shaped.weights.len() as u32,
@@ -143,6 +148,13 @@ impl Lists {
             lists.groups.extend(firsts.map(|first| DeformGroup { deformation: number, first }));
         }
         lists
+    }
+
+    /// From the first vertex to the last.
+    fn vertices(&self) -> Range<u32> {
+        let ranges = self.deformations.iter().map(|d| (d.first_vertex, d.first_vertex + d.vertex_count));
+        let around = |all: (u32, u32), one: (u32, u32)| (all.0.min(one.0), all.1.max(one.1));
+        ranges.reduce(around).map_or(0..0, |(first, end)| first..end)
     }
 
     /// Lists a shape once. Where its vertices, influences and targets begin.

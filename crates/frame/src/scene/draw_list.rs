@@ -84,15 +84,15 @@ impl DrawQuery {
     /// How a view chooses and orders draws.
     pub fn new(options: &DrawParams, view: &QueryView) -> Self {
         let bounds_ws = &view.bounds_ws;
-        let mut planes = Vec::new();
+        let mut planes = [Vec4::W; PLANES];
         // The rows alone cull: what the view does not cull stays in some rows at least.
         if options.cull == Cull::Frustum {
-            planes.extend(Frustum::new(view.clip_from_world).0);
+            planes[..6].copy_from_slice(&Frustum::new(view.clip_from_world).0);
         }
         if let Some(rows) = &view.rows {
-            planes.extend(Rows::new(view.clip_from_world, rows.clone(), view.height_px).0);
+            let rows = Rows::new(view.clip_from_world, rows.clone(), view.height_px).0;
+            planes[6..].iter_mut().zip(rows).for_each(|(to, plane)| *to = plane);
         }
-        planes.resize(PLANES, Vec4::W);
         let (distance_from_world, px_at_one) = view.size_on_image;
         let farthest_sq =
             (bounds_ws.min - view.eye_ws).abs().max((bounds_ws.max - view.eye_ws).abs()).length_squared();
@@ -144,17 +144,28 @@ impl DrawQuery {
 
     /// Chooses and orders the draws of a scene, which stand where `infos` says: near to far by bins, those of one bin as in the scene.
     pub fn choose(&self, bucket_first: &[u32; BUCKETS + 1], infos: &[DrawInfo]) -> DrawsInOrder {
-        let mut words: Vec<u64> = Vec::new();
-        std::array::from_fn(|bucket| {
-            let draws = bucket_first[bucket]..bucket_first[bucket + 1];
+        let mut draws = DrawsInOrder::default();
+        self.choose_into(bucket_first, infos, (&mut draws, &mut Vec::new()));
+        draws
+    }
+
+    /// The same in memory that was used before: the draws, and the words that they are sorted by.
+    pub fn choose_into(
+        &self,
+        bucket_first: &[u32; BUCKETS + 1],
+        infos: &[DrawInfo],
+        (draws, words): (&mut DrawsInOrder, &mut Vec<u64>),
+    ) {
+        for (ends, draws) in bucket_first.windows(2).zip(draws) {
             words.clear();
-            words.extend(draws.filter_map(|draw| {
+            words.extend((ends[0]..ends[1]).filter_map(|draw| {
                 let bin = self.bin(&infos[draw as usize].bounds_ws)?;
                 Some(u64::from(bin) << 32 | u64::from(draw))
             }));
             words.sort_unstable();
-            words.iter().copied().map(place_of).collect()
-        })
+            draws.clear();
+            draws.extend(words.iter().copied().map(place_of));
+        }
     }
 }
 

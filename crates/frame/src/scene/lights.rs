@@ -8,7 +8,8 @@ use glam::Vec3;
 use crate::upload::{put, record_image};
 
 /// Lights on the device: those without an end first, so that techniques with light volumes can tell them apart, the others along
-/// a curve that keeps neighbours together (`lights/bvh/`).
+/// a curve that keeps neighbours together (`lights/bvh/`). Clones share the images.
+#[derive(Clone)]
 pub struct SceneLights {
     /// Four texels a light.
     pub data: gpu::Image,
@@ -22,6 +23,8 @@ pub struct SceneLights {
     pub only_points: bool,
     /// The lights in the order of the device.
     pub lights: Vec<Light>,
+    /// What they are ordered by, kept for its memory.
+    keyed: Vec<Keyed>,
 }
 
 impl SceneLights {
@@ -51,28 +54,23 @@ impl SceneLights {
             unbounded_count: lights.iter().filter(|l| is_unbounded(l)).count() as u32,
             only_points: lights.iter().all(|l| l.kind == LightKind::Point),
             lights,
+            keyed: Vec::new(),
         })
     }
 
-    /// The same images for lights that have moved, in [`device_order`]; their records must be written anew ([`Self::fill_data`],
-    /// [`Self::fill_spheres`]). `None` where they are not as many, or of other kinds: what is recorded for the old ones does not fit them.
-    pub fn moved(&self, lights: &[Light]) -> Option<Self> {
-        let lights = device_order(lights);
+    /// Moves the lights of a copy, which shares the images, in [`device_order`]; their records must be written anew ([`Self::fill_data`],
+    /// [`Self::fill_spheres`]). False, and nothing moves, where they are not as many, or of other kinds: what is recorded for the old ones
+    /// does not fit them. Memory is used again.
+    pub fn set(&mut self, lights: &[Light]) -> bool {
         let unbounded = lights.iter().filter(|light| is_unbounded(light)).count() as u32;
         let only_points = lights.iter().all(|l| l.kind == LightKind::Point);
         let fits = lights.len() as u32 == self.count
             && unbounded == self.unbounded_count
             && only_points == self.only_points;
-        let Self { data, spheres, count, unbounded_count, .. } = self;
-        let (data, spheres) = (data.clone(), spheres.clone());
-        fits.then_some(Self {
-            data,
-            spheres,
-            count: *count,
-            unbounded_count: *unbounded_count,
-            only_points,
-            lights,
-        })
+        if fits {
+            order_into(lights, &mut self.keyed, &mut self.lights);
+        }
+        fits
     }
 
     /// Writes the records of [`Self::data`], as long as that image.
@@ -99,14 +97,28 @@ impl SceneLights {
 /// Lights in the order in which the device holds and visits them: those without an end first, the others along a Morton curve through
 /// their places, so that 32 in a row are neighbours. Stable: what is in order stays.
 pub fn device_order(lights: &[Light]) -> Vec<Light> {
+    let mut ordered = Vec::new();
+    order_into(lights, &mut Vec::new(), &mut ordered);
+    ordered
+}
+
+/// What a light is ordered by: whether it has an end, its place along the curve, its place in the list.
+type Keyed = (bool, u64, u32);
+
+/// As [`device_order`], into memory that is used again.
+fn order_into(lights: &[Light], keyed: &mut Vec<Keyed>, ordered: &mut Vec<Light>) {
     let mut bounds_ws = Aabb::EMPTY;
     lights.iter().filter(|l| !is_unbounded(l)).for_each(|l| bounds_ws.extend(l.position_ws));
-    let mut lights = lights.to_vec();
-    lights.sort_by_cached_key(|light| match is_unbounded(light) {
-        true => (0, 0),
-        false => (1, morton_code(&bounds_ws, light.position_ws)),
-    });
-    lights
+    let key = |(place, light): (u32, &Light)| match is_unbounded(light) {
+        true => (false, 0, place),
+        false => (true, morton_code(&bounds_ws, light.position_ws), place),
+    };
+    keyed.clear();
+    keyed.extend((0..).zip(lights).map(key));
+    // No two are equal, so that lights of one place stay in their order.
+    keyed.sort_unstable();
+    ordered.clear();
+    ordered.extend(keyed.iter().map(|(.., place)| lights[*place as usize]));
 }
 
 /// Place of a point along the Morton curve through a box: 21 bits an axis, interleaved, steps of one length along all axes.

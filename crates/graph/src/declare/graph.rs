@@ -7,9 +7,11 @@ use afterlight_roles::{BufferRole, PassRole};
 use afterlight_shader::Shader;
 
 use super::compute_pass::ComputePass;
-use super::handles::{BufferHandle, Handle, ImageHandle, ResourceId};
+use super::handles::{BufferHandle, Handle, History, ImageHandle, ResourceId};
 use super::image_info::ImageInfo;
-use super::nodes::{ComputeNode, Import, PassKind, PassNode, RasterNode, ResourceKind, ResourceNode};
+use super::nodes::{
+    ComputeNode, Import, PassKind, PassNode, RasterNode, ResourceKind, ResourceNode, Version,
+};
 use super::raster_pass::RasterPass;
 use crate::error::GraphError;
 
@@ -78,6 +80,7 @@ impl Graph {
             role,
             kind,
             import,
+            version: None,
             kept: false,
             output: false,
         });
@@ -94,6 +97,31 @@ impl Graph {
     pub fn buffer(&mut self, name: &str, role: BufferRole, bytes: u64) -> BufferHandle {
         let resource = self.add(name, role, ResourceKind::Buffer { bytes }, None);
         BufferHandle { graph: self.id, resource, bytes }
+    }
+
+    /// Declares an image that the next frame can read: what passes write to `now` is in `before` of the next frame. Nothing is copied: two
+    /// images take turns ([`Turn`](crate::Turn)). Both live for the whole frame and share memory with nothing. Some pass must write all of `now`
+    /// that a pass reads of `before`.
+    pub fn history_image(&mut self, name: &str, role: BufferRole, info: ImageInfo) -> History<ImageHandle> {
+        let [before, now] = self.add_versions(name, role, &ResourceKind::Image(info));
+        let handle = |resource| ImageHandle { graph: self.id, resource, info };
+        History { before: handle(before), now: handle(now) }
+    }
+
+    /// Declares a buffer of `bytes` bytes that the next frame can read, as [`Graph::history_image`].
+    pub fn history_buffer(&mut self, name: &str, role: BufferRole, bytes: u64) -> History<BufferHandle> {
+        let [before, now] = self.add_versions(name, role, &ResourceKind::Buffer { bytes });
+        let handle = |resource| BufferHandle { graph: self.id, resource, bytes };
+        History { before: handle(before), now: handle(now) }
+    }
+
+    /// Adds the versions of the frame before and of this frame.
+    fn add_versions(&mut self, name: &str, role: BufferRole, kind: &ResourceKind) -> [ResourceId; 2] {
+        let before = self.add(&format!("{name} before"), role, kind.clone(), None);
+        let now = self.add(name, role, kind.clone(), None);
+        self.resources[before.0 as usize].version = Some(Version::Before { now });
+        self.resources[now.0 as usize].version = Some(Version::Now { before });
+        [before, now]
     }
 
     /// Brings in a buffer that lives outside the graph; passes that write it always run.

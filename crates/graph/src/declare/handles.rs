@@ -48,6 +48,16 @@ impl BufferHandle {
     }
 }
 
+/// A resource with history: what the frame before wrote, and what this frame writes.
+#[derive(Debug)]
+pub struct History<H> {
+    /// What the frame before wrote as [`History::now`]. Passes may read it alone. Where the frame before is of no use, its contents are
+    /// defined but mean nothing: zeros, or what some earlier frame wrote. Who runs the frames tells shaders so.
+    pub before: H,
+    /// What this frame writes, as any resource, and the next one reads.
+    pub now: H,
+}
+
 mod sealed {
     pub trait Sealed {}
     impl Sealed for super::ImageHandle {}

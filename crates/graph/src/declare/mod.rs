@@ -26,8 +26,9 @@ pub use constants::ConstantBits;
 pub use draw::{Draw, DrawCall, Rect};
 pub use fixed_function::{Blend, BlendEquation, DepthTest, StencilFace, StencilTest};
 pub use graph::Graph;
-pub use handles::{BufferHandle, Handle, ImageHandle, ResourceId};
+pub use handles::{BufferHandle, Handle, History, ImageHandle, ResourceId};
 pub use image_info::{ImageInfo, Subresource};
+pub use nodes::Version;
 pub(crate) use nodes::{
     CallNode, ColorLoad, ColorNode, DepthNode, DispatchCall, DrawNode, Import, Intent, PassKind, PassNode,
     RasterCommand, RasterNode, ResourceKind, ResourceNode, TransferNode,

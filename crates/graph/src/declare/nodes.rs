@@ -11,7 +11,7 @@ use super::raster_pass::Load;
 use super::raster_state::RasterState;
 use super::script::ScriptId;
 
-#[derive(Clone)]
+#[derive(Clone, PartialEq, Eq)]
 pub(crate) enum ResourceKind {
     Image(ImageInfo),
     Buffer { bytes: u64 },
@@ -31,12 +31,39 @@ pub(crate) enum Import {
     },
 }
 
+/// Which of the two versions of a resource with history a resource is; each names the other one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Version {
+    /// What this frame writes, and the next frame reads.
+    Now {
+        /// The version that the frame before wrote.
+        before: ResourceId,
+    },
+    /// What the frame before wrote.
+    Before {
+        /// The version that this frame writes.
+        now: ResourceId,
+    },
+}
+
+impl Version {
+    /// The other version.
+    pub fn other(self) -> ResourceId {
+        match self {
+            Self::Now { before } => before,
+            Self::Before { now } => now,
+        }
+    }
+}
+
 #[derive(Clone)]
 pub(crate) struct ResourceNode {
     pub name: String,
     pub role: BufferRole,
     pub kind: ResourceKind,
     pub import: Option<Import>,
+    /// Of resources with history.
+    pub version: Option<Version>,
     pub kept: bool,
     pub output: bool,
 }
@@ -197,6 +224,13 @@ impl PassKind {
             }
             Self::Transfer(_) => PassWork::Copy,
         }
+    }
+}
+
+impl ResourceNode {
+    /// Whether the frame before wrote it.
+    pub(crate) fn is_before(&self) -> bool {
+        matches!(self.version, Some(Version::Before { .. }))
     }
 }
 

@@ -51,14 +51,17 @@ impl Builder<'_> {
         Ok(image.view(&desc)?)
     }
 
-    pub(super) fn passes(&self) -> Result<Vec<BoundPass>, GraphError> {
-        let (jobs, pipeline_of) = self.jobs();
-        let pipelines = self.make_pipelines(&jobs)?;
+    /// The passes, with pipelines that [`Builder::make_pipelines`] has made of these jobs.
+    pub(super) fn passes(
+        &self,
+        (jobs, pipeline_of): (&[Job], &[Vec<usize>]),
+        pipelines: &[gpu::Pipeline],
+    ) -> Result<Vec<BoundPass>, GraphError> {
         let mut passes = Vec::with_capacity(self.plan.passes.len());
         for (index, pass) in self.plan.passes.iter().enumerate() {
             let made: Vec<(Job, gpu::Pipeline)> = jobs
                 .iter()
-                .zip(&pipelines)
+                .zip(pipelines)
                 .filter(|(job, _)| job.pass == index)
                 .map(|(job, pipeline)| (*job, pipeline.clone()))
                 .collect();

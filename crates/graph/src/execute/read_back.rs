@@ -2,9 +2,9 @@
 
 use afterlight_gpu::{self as gpu, GpuError, vk};
 
-use super::Executor;
 use super::builder::image_to_buffer;
 use super::resources::Physical;
+use super::{Bound, Executor, Turn};
 use crate::declare::ResourceId;
 use crate::error::GraphError;
 use crate::plan::{Plan, aspects};
@@ -60,7 +60,7 @@ impl Executor {
         if !resource.kept && !resource.imported {
             return Err(kept("not kept: its memory may hold another resource"));
         }
-        if matches!(self.physical[id.0 as usize], Physical::Unused) {
+        if matches!(self.bound[0].physical[id.0 as usize], Physical::Unused) {
             return Err(kept("used by no pass"));
         }
         Ok(id)
@@ -70,28 +70,33 @@ impl Executor {
         GraphError::NotReadable { name: key.label(), found, expected: expected.to_owned() }
     }
 
-    /// Returns a buffer of the frame that was kept or imported.
+    /// Returns a buffer of the frame that was kept or imported; with history, as the last [`Executor::run`] has it.
     ///
     /// # Errors
     /// No such resource, or one that is not kept.
     pub fn buffer(&self, key: impl ResourceKey) -> Result<&gpu::Buffer, GraphError> {
         let id = self.find(&key)?;
-        match &self.physical[id.0 as usize] {
+        match &self.last_bound().physical[id.0 as usize] {
             Physical::Buffer(buffer) => Ok(buffer),
             _ => Err(self.not_readable(&key, "an image", "a buffer")),
         }
     }
 
-    /// Returns an image of the frame that was kept or imported.
+    /// Returns an image of the frame that was kept or imported; with history, as the last [`Executor::run`] has it.
     ///
     /// # Errors
     /// No such resource, or one that is not kept.
     pub fn image(&self, key: impl ResourceKey) -> Result<&gpu::Image, GraphError> {
         let id = self.find(&key)?;
-        match &self.physical[id.0 as usize] {
+        match &self.last_bound().physical[id.0 as usize] {
             Physical::Image(image) => Ok(image),
             _ => Err(self.not_readable(&key, "a buffer", "an image")),
         }
+    }
+
+    /// What the last run has recorded.
+    fn last_bound(&self) -> &Bound {
+        self.bound(self.last.unwrap_or_default())
     }
 
     fn read_back(
@@ -132,17 +137,17 @@ impl Executor {
     /// # Errors
     /// No such resource, one that is not kept or has several samples, or no memory.
     pub fn read_image(&self, key: impl ResourceKey) -> Result<Vec<u8>, GraphError> {
-        let copy = self.image_copy(&key)?;
+        let copy = self.image_copy(&key, self.last.unwrap_or_default())?;
         self.read_back(copy.bytes(), |encoder, target| {
             copy.record(encoder, target, 0);
             Ok(())
         })
     }
 
-    /// A copy of mip level 0 of a kept or imported image.
-    pub(super) fn image_copy(&self, key: &impl ResourceKey) -> Result<ImageCopy, GraphError> {
+    /// A copy of mip level 0 of a kept or imported image, as frames of a turn have it.
+    pub(super) fn image_copy(&self, key: &impl ResourceKey, turn: Turn) -> Result<ImageCopy, GraphError> {
         let id = self.find(key)?;
-        let image = match &self.physical[id.0 as usize] {
+        let image = match &self.bound(turn).physical[id.0 as usize] {
             Physical::Image(image) => image,
             _ => return Err(self.not_readable(key, "a buffer", "an image")),
         };

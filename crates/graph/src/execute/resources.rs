@@ -70,23 +70,44 @@ fn check_memory(device: &Device, plan: &Plan) -> Result<(), GraphError> {
     Ok(())
 }
 
-pub(super) fn make_resources(device: &Device, plan: &Plan) -> Result<Vec<Physical>, GraphError> {
+/// Makes the plan's resources; those with history are `taken_over` from an earlier plan, where all of them are there.
+pub(super) fn make_resources(
+    device: &Device,
+    plan: &Plan,
+    taken_over: Option<&[Physical]>,
+) -> Result<Vec<Physical>, GraphError> {
     check_memory(device, plan)?;
-    let heaps: Vec<gpu::Heap> = plan
+    let is_taken = |index: usize| {
+        let mut inside = plan
+            .resources
+            .iter()
+            .filter(|resource| resource.placement.is_some_and(|place| place.heap == index));
+        taken_over.is_some() && inside.all(|resource| resource.version.is_some())
+    };
+    let heaps: Vec<Option<gpu::Heap>> = plan
         .heaps
         .iter()
         .enumerate()
         .map(|(index, heap)| {
+            if is_taken(index) {
+                return Ok(None);
+            }
             let inside = |place: Option<Placement>| place.is_some_and(|place| place.heap == index);
             let residents = plan.resources.iter().filter(|resource| inside(resource.placement));
             let largest =
                 residents.max_by_key(|resource| resource.need.bytes).map_or("", |resource| &resource.name);
-            device.create_heap(&format!("frame heap of {largest} and others"), heap.bytes, heap.type_bits)
+            let name = format!("frame heap of {largest} and others");
+            device.create_heap(&name, heap.bytes, heap.type_bits).map(Some)
         })
-        .collect::<Result<_, _>>()?;
+        .collect::<Result<_, GpuError>>()?;
     plan.resources
         .iter()
-        .map(|resource| {
+        .enumerate()
+        .map(|(index, resource)| {
+            if let (Some(taken), Some(_)) = (taken_over, resource.version) {
+                return Ok(taken[index].clone());
+            }
+            let heap = |place: Placement| heaps[place.heap].as_ref().expect("others have heaps of their own");
             let missing = |found: String, expected: String| GraphError::BadResource {
                 name: resource.name.clone(),
                 what: "usage of the imported resource",
@@ -114,11 +135,11 @@ pub(super) fn make_resources(device: &Device, plan: &Plan) -> Result<Vec<Physica
                 }
                 (None, ResourceKind::Image(info), Some(place)) => {
                     let desc = image_desc(&resource.name, info, resource.image_usage);
-                    Ok(Physical::Image(device.create_image_in(&desc, &heaps[place.heap], place.offset)?))
+                    Ok(Physical::Image(device.create_image_in(&desc, heap(place), place.offset)?))
                 }
                 (None, ResourceKind::Buffer { bytes }, Some(place)) => {
                     let desc = buffer_desc(&resource.name, *bytes, resource.buffer_usage);
-                    Ok(Physical::Buffer(device.create_buffer_in(&desc, &heaps[place.heap], place.offset)?))
+                    Ok(Physical::Buffer(device.create_buffer_in(&desc, heap(place), place.offset)?))
                 }
                 _ => Ok(Physical::Unused),
             }

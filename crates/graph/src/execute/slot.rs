@@ -1,13 +1,13 @@
 //! A frame in flight: recorded once, submitted many times, never waited for unless its own last submission still runs.
 //!
 //! All frames run on one queue, one after another, and share the plan's images and buffers. What a frame holds for itself is what the host
-//! writes before it and reads after it: inputs and outputs.
+//! writes before it and reads after it: inputs and outputs. Where resources have history, it has commands for each of two turns.
 
 use afterlight_gpu::{self as gpu, Device, GpuError, vk};
 
 use super::builder::image_to_buffer;
 use super::read_back::{ANY, ANY_WRITE, COPY_READ, ImageCopy};
-use super::{Executor, Marks};
+use super::{Executor, Marks, Turn};
 use crate::declare::ResourceId;
 use crate::error::GraphError;
 use crate::execute::resources::Physical;
@@ -120,7 +120,10 @@ pub struct FrameTimes {
 /// A frame of an [`Executor`] that waits for its next submission, or is in flight.
 pub struct FrameSlot {
     ends: Ends,
-    recorded: Recorded,
+    /// One a turn.
+    recorded: Vec<Recorded>,
+    /// The turn of its last submission.
+    turn: Turn,
     completed: gpu::Completed,
     times: FrameTimes,
 }
@@ -159,32 +162,40 @@ impl Executor {
 
         let mut room = Room::default();
         let mut copied = |id: &ResourceId| {
-            let copy = match &self.physical[self.find(id)?.0 as usize] {
-                Physical::Image(_) => Copied::Image(self.image_copy(id)?),
-                _ => Copied::Buffer(self.buffer(*id)?.clone()),
-            };
-            let place = room.place(copy.bytes());
-            Ok((copy, place))
+            let copies = self.turns().iter().map(|turn| self.copied(*id, *turn));
+            let copies = copies.collect::<Result<Vec<_>, _>>()?;
+            let place = room.place(copies[0].bytes());
+            Ok((copies, place))
         };
         let outputs = outputs.iter().map(&mut copied).collect::<Result<Vec<_>, GraphError>>()?;
         let read = room.buffer(&self.device, "frame outputs", gpu::MemoryKind::Readback)?;
         let ends = Ends { written, inputs, read, outputs, for_callers };
-        let recorded = self.record_between(&ends)?;
+        let recorded =
+            self.turns().iter().map(|turn| self.record_between(&ends, *turn)).collect::<Result<_, _>>()?;
         let (completed, times) = (gpu::Completed::default(), FrameTimes::default());
-        Ok(FrameSlot { ends, recorded, completed, times })
+        Ok(FrameSlot { ends, recorded, turn: Turn::default(), completed, times })
     }
 
-    /// Records the frame of a slot anew, with the scripts as they are now. Waits for its last submission.
+    /// What is copied of an output after frames of a turn.
+    fn copied(&self, id: ResourceId, turn: Turn) -> Result<Copied, GraphError> {
+        match &self.bound(turn).physical[self.find(&id)?.0 as usize] {
+            Physical::Buffer(buffer) => Ok(Copied::Buffer(buffer.clone())),
+            _ => Ok(Copied::Image(self.image_copy(&id, turn)?)),
+        }
+    }
+
+    /// Records the frame of a slot anew for a turn, with the scripts as they are now. Waits for its last submission.
     ///
     /// # Errors
     /// The device was lost, a recording that it refuses.
-    pub fn record_again(&self, slot: &mut FrameSlot) -> Result<(), GraphError> {
-        slot.recorded.recording.wait()?;
-        slot.recorded = self.record_between(&slot.ends)?;
+    pub fn record_again(&self, slot: &mut FrameSlot, turn: Turn) -> Result<(), GraphError> {
+        slot.wait()?;
+        let place = turn.index() % slot.recorded.len();
+        slot.recorded[place] = self.record_between(&slot.ends, turn)?;
         Ok(())
     }
 
-    fn record_between(&self, ends: &Ends) -> Result<Recorded, GraphError> {
+    fn record_between(&self, ends: &Ends, turn: Turn) -> Result<Recorded, GraphError> {
         let mut encoder = match ends.for_callers {
             true => self.device.encoder_for_callers()?,
             false => self.device.encoder_for_many()?,
@@ -197,11 +208,11 @@ impl Executor {
             }
             encoder.barriers(&[gpu::MemoryBarrier { before: ANY_WRITE, after: ANY }], &[], &[]);
         }
-        let marks = self.record(&mut encoder, false)?;
+        let marks = self.record(&mut encoder, turn, false)?;
         if let Some(read) = &ends.read {
             encoder.barriers(&[gpu::MemoryBarrier { before: ANY_WRITE, after: COPY_READ }], &[], &[]);
-            for (copy, place) in &ends.outputs {
-                match copy {
+            for (copies, place) in &ends.outputs {
+                match &copies[turn.index() % copies.len()] {
                     Copied::Buffer(buffer) => {
                         encoder.copy_buffer(buffer, 0, read, place.offset, place.bytes)?
                     }
@@ -219,7 +230,8 @@ struct Ends {
     written: Option<gpu::Buffer>,
     inputs: Vec<(FrameInput, Place)>,
     read: Option<gpu::Buffer>,
-    outputs: Vec<(Copied, Place)>,
+    /// A copy a turn.
+    outputs: Vec<(Vec<Copied>, Place)>,
     /// Whether another program's command buffer executes the frame.
     for_callers: bool,
 }
@@ -253,29 +265,45 @@ pub(super) fn after_earlier_frames(encoder: &mut gpu::Encoder) {
 }
 
 impl FrameSlot {
+    /// The commands of the last submission.
+    fn submitted(&self) -> &Recorded {
+        &self.recorded[self.turn.index() % self.recorded.len()]
+    }
+
+    /// The commands of a turn, of which the next submission is. The host reads and writes one memory for both turns: the last submission is
+    /// waited for.
+    fn take_turn(&mut self, turn: Turn) -> Result<&mut Recorded, GraphError> {
+        if turn != self.turn {
+            self.wait()?;
+            self.turn = turn;
+        }
+        let place = turn.index() % self.recorded.len();
+        Ok(&mut self.recorded[place])
+    }
+
     /// Lets `write` fill input number `input`, as long as its buffer; waits for the slot's last submission. What is not written stays as
     /// the slot had it last.
     ///
     /// # Errors
     /// The device was lost.
     pub fn write(&mut self, input: usize, write: impl FnOnce(&mut [u8])) -> Result<(), GraphError> {
-        self.recorded.recording.wait()?;
+        self.wait()?;
         let place = self.ends.inputs[input].1;
         let Some(written) = &self.ends.written else { return Ok(()) };
         let [from, end] = [place.offset, place.offset + place.bytes].map(|at| at as usize);
         Ok(written.with_mapped_mut(|bytes| write(&mut bytes[from..end]))?)
     }
 
-    /// Submits the frame and returns at once; only its own last submission is waited for.
+    /// Submits the frame of a turn and returns at once; only its own last submission is waited for. Without history all turns are one.
     ///
     /// # Errors
     /// The device was lost.
-    pub fn submit(&mut self) -> Result<(), GraphError> {
-        Ok(self.recorded.recording.submit()?)
+    pub fn submit(&mut self, turn: Turn) -> Result<(), GraphError> {
+        Ok(self.take_turn(turn)?.recording.submit()?)
     }
 
-    /// Adds the frame to another program's command buffer, and a copy of `picture`, a kept colour image of the executor that the frame is of,
-    /// to its image.
+    /// Adds the frame of a turn to another program's command buffer, and a copy of `picture`, a kept colour image of the executor that the
+    /// frame is of, to its image.
     ///
     /// # Errors
     /// A picture that [`Executor::read_image`] would refuse; a target of a format that it cannot be copied to.
@@ -285,20 +313,22 @@ impl FrameSlot {
     pub fn execute_in(
         &mut self,
         executor: &Executor,
-        picture: ResourceId,
+        (picture, turn): (ResourceId, Turn),
         commands: &gpu::CallersCommands,
         target: &gpu::Target,
     ) -> Result<(), GraphError> {
         assert!(self.ends.for_callers, "a frame that is submitted is added to another program's commands");
-        let copy = executor.image_copy(&picture)?;
+        let copy = executor.image_copy(&picture, turn)?;
         executor.device.check_target(target)?;
-        executor.device.execute_in(commands, &mut self.recorded.recording);
+        executor.device.execute_in(commands, &mut self.take_turn(turn)?.recording);
         copy.to_target(&executor.device, commands, target)
     }
 
     /// The device is done with the command buffer that the frame was added to, or it will never be submitted.
     pub fn release_from_caller(&mut self) {
-        self.recorded.recording.release_from_caller();
+        for recorded in &mut self.recorded {
+            recorded.recording.release_from_caller();
+        }
     }
 
     /// Waits for the last submission.
@@ -306,7 +336,8 @@ impl FrameSlot {
     /// # Errors
     /// The device was lost.
     pub fn wait(&mut self) -> Result<(), GraphError> {
-        Ok(self.recorded.recording.wait()?)
+        let place = self.turn.index() % self.recorded.len();
+        Ok(self.recorded[place].recording.wait()?)
     }
 
     /// Whether the device has nothing of the frame left to do.
@@ -314,7 +345,7 @@ impl FrameSlot {
     /// # Errors
     /// The device was lost.
     pub fn is_done(&self) -> Result<bool, GraphError> {
-        Ok(self.recorded.recording.is_done()?)
+        Ok(self.submitted().recording.is_done()?)
     }
 
     /// Waits for the last submission and returns its times.
@@ -322,10 +353,12 @@ impl FrameSlot {
     /// # Errors
     /// The device was lost.
     pub fn finish(&mut self) -> Result<&FrameTimes, GraphError> {
-        self.recorded.recording.collect(&mut self.completed)?;
-        let (completed, times) = (&self.completed, &self.recorded.marks.times);
-        self.times.start_ns = completed.ns(self.recorded.start);
-        let whole_ns = completed.elapsed_ns(self.recorded.start, self.recorded.end);
+        let place = self.turn.index() % self.recorded.len();
+        let recorded = &mut self.recorded[place];
+        recorded.recording.collect(&mut self.completed)?;
+        let (completed, times) = (&self.completed, &recorded.marks.times);
+        self.times.start_ns = completed.ns(recorded.start);
+        let whole_ns = completed.elapsed_ns(recorded.start, recorded.end);
         self.times.end_ns = self.times.start_ns.zip(whole_ns).map(|(start_ns, whole_ns)| start_ns + whole_ns);
         self.times.frame_ns = completed.elapsed_ns(times[0], times[times.len() - 1]);
         self.times.pass_ns.clear();
@@ -338,13 +371,31 @@ impl FrameSlot {
     /// # Errors
     /// The device was lost.
     pub fn read<T>(&mut self, output: usize, read: impl FnOnce(&[u8]) -> T) -> Result<T, GraphError> {
-        self.recorded.recording.wait()?;
+        self.wait()?;
         let place = self.ends.outputs[output].1;
         let [from, end] = [place.offset, place.offset + place.bytes].map(|at| at as usize);
         match &self.ends.read {
             Some(buffer) => Ok(buffer.with_mapped_mut(|bytes| read(&bytes[from..end]))?),
             None => Ok(read(&[])),
         }
+    }
+
+    /// Waits for the last submission, and lets `read` see its times and output number `output`, where one is named.
+    ///
+    /// # Errors
+    /// The device was lost.
+    pub fn finish_and_read<T>(
+        &mut self,
+        output: Option<usize>,
+        read: impl FnOnce(&FrameTimes, Option<&[u8]>) -> T,
+    ) -> Result<T, GraphError> {
+        self.finish()?;
+        let Some(output) = output else { return Ok(read(&self.times, None)) };
+        // Lent out, since the reading borrows the slot.
+        let times = std::mem::take(&mut self.times);
+        let seen = self.read(output, |bytes| read(&times, Some(bytes)));
+        self.times = times;
+        seen
     }
 
     /// Bytes that the slot holds beside the plan, which all slots share.

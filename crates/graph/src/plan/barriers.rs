@@ -8,7 +8,7 @@ use super::PlannedResource;
 use super::access::WRITES;
 use super::hazards::{Cell, CellUse, cell_count, mips_of};
 use super::placement::shares_memory;
-use crate::declare::{Import, ResourceId, ResourceKind, Subresource};
+use crate::declare::{Import, ResourceId, ResourceKind, Subresource, Version};
 
 /// One barrier of a plan. Without a resource it is a memory barrier: the memory changes its owner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,6 +61,10 @@ pub(super) struct BarrierPlanner<'a> {
     pub(super) states: Vec<Vec<CellState>>,
     /// Whether some pass writes the resource.
     pub(super) written: Vec<bool>,
+    /// Layouts of the parts of a resource between frames; `None` where none must hold.
+    homes: Vec<Option<Vec<vk::ImageLayout>>>,
+    /// Of resources with history: stages of the frame before that may use its memory, and how they write.
+    earlier: Vec<(vk::PipelineStageFlags2, vk::AccessFlags2)>,
 }
 
 /// A barrier of one part, before parts are joined.
@@ -76,23 +80,22 @@ struct CellBarrier {
 
 impl<'a> BarrierPlanner<'a> {
     pub(super) fn new(resources: &'a [PlannedResource], uses: &'a [&'a BTreeMap<Cell, CellUse>]) -> Self {
-        let states = resources
-            .iter()
-            .map(|resource| {
-                let layout = match &resource.import {
-                    Some(Import::Image { layout, .. }) => *layout,
-                    #[cfg(test)]
-                    Some(Import::Fake { layout }) => *layout,
-                    _ => vk::ImageLayout::UNDEFINED,
-                };
-                vec![CellState { layout, ..CellState::default() }; cell_count(&resource.kind)]
-            })
-            .collect();
+        let homes = homes(resources, uses);
+        let state = |resource: &PlannedResource, home: &Option<Vec<vk::ImageLayout>>| {
+            // What this frame writes of a resource with history begins without contents.
+            let is_now = matches!(resource.version, Some(Version::Now { .. }));
+            let home = home.as_ref().filter(|_| !is_now);
+            let layout = |cell: usize| home.map_or(vk::ImageLayout::UNDEFINED, |home| home[cell]);
+            let cells = 0..cell_count(&resource.kind);
+            cells.map(|cell| CellState { layout: layout(cell), ..CellState::default() }).collect()
+        };
+        let states = resources.iter().zip(&homes).map(|(resource, home)| state(resource, home)).collect();
         let mut written = vec![false; resources.len()];
         for ((id, _), cell_use) in uses.iter().flat_map(|uses| uses.iter()) {
             written[id.0 as usize] |= cell_use.write;
         }
-        Self { resources, uses, states, written }
+        let earlier = uses_of_versions(resources, uses);
+        Self { resources, uses, states, written, homes, earlier }
     }
 
     /// The union of this read and those that follow it up to the next write or layout change.
@@ -110,7 +113,8 @@ impl<'a> BarrierPlanner<'a> {
     }
 
     /// What must have happened before the first use of a part in the frame.
-    fn before_first(&self, pass: usize, id: ResourceId) -> (vk::PipelineStageFlags2, vk::AccessFlags2) {
+    fn before_first(&self, pass: usize, cell: &Cell) -> (vk::PipelineStageFlags2, vk::AccessFlags2) {
+        let id = cell.0;
         let resource = &self.resources[id.0 as usize];
         if resource.imported {
             // Earlier frames, and uploads, may have used it in any way.
@@ -120,7 +124,13 @@ impl<'a> BarrierPlanner<'a> {
                 (vk::PipelineStageFlags2::NONE, vk::AccessFlags2::NONE)
             };
         }
-        let mut before = (vk::PipelineStageFlags2::NONE, vk::AccessFlags2::NONE);
+        let nothing = (vk::PipelineStageFlags2::NONE, vk::AccessFlags2::NONE);
+        match resource.version {
+            Some(Version::Before { now }) if self.returns_home(&(now, cell.1)) => return nothing,
+            Some(_) => return self.earlier[id.0 as usize],
+            None => {}
+        }
+        let mut before = nothing;
         for (index, other) in self.resources.iter().enumerate() {
             let earlier = other.lifetime.is_some_and(|lifetime| lifetime.1 < pass);
             if index != id.0 as usize && earlier && shares_memory(other, resource) {
@@ -132,14 +142,23 @@ impl<'a> BarrierPlanner<'a> {
         before
     }
 
+    /// Whether a part changes its layout at the end of the frame, by a barrier that shows it to all that follows.
+    fn returns_home(&self, cell: &Cell) -> bool {
+        let last = self.uses.iter().rev().find_map(|uses| uses.get(cell));
+        let home = self.homes[cell.0.0 as usize].as_ref().map(|home| home[cell.1]);
+        last.zip(home).is_some_and(|(last, home)| last.layout != home)
+    }
+
     fn cell_barrier(&mut self, pass: usize, cell: &Cell) -> (Option<CellBarrier>, Option<CellBarrier>) {
         let cell_use = self.uses[pass][cell];
         let is_image = matches!(self.resources[cell.0.0 as usize].kind, ResourceKind::Image(_));
-        let is_transient = !self.resources[cell.0.0 as usize].imported;
+        let resource = &self.resources[cell.0.0 as usize];
+        // Its memory may be another one's.
+        let is_transient = !resource.imported && resource.version.is_none();
         let state = &self.states[cell.0.0 as usize][cell.1];
         let first = !state.touched;
         let (src_stages, src_access) =
-            if first { self.before_first(pass, cell.0) } else { (state.stages(), state.write_access) };
+            if first { self.before_first(pass, cell) } else { (state.stages(), state.write_access) };
         let transition = is_image && state.layout != cell_use.layout;
         let hazard = if cell_use.write {
             !src_stages.is_empty()
@@ -235,29 +254,23 @@ impl<'a> BarrierPlanner<'a> {
         out
     }
 
-    /// Returns imported images to the layout in which they came.
+    /// Returns images to the layouts that hold between frames.
     pub(super) fn finish(&self) -> Vec<Barrier> {
         let mut out = Vec::new();
         for (index, resource) in self.resources.iter().enumerate() {
-            let home = match &resource.import {
-                Some(Import::Image { layout, .. }) => *layout,
-                #[cfg(test)]
-                Some(Import::Fake { layout }) => *layout,
-                _ => continue,
-            };
-            if home == vk::ImageLayout::UNDEFINED {
-                continue;
-            }
+            let Some(home) = &self.homes[index] else { continue };
             let grid: Vec<Option<CellBarrier>> = self.states[index]
                 .iter()
-                .map(|state| {
-                    (state.layout != home).then_some(CellBarrier {
+                .zip(home)
+                .map(|(state, home)| {
+                    let moves = *home != vk::ImageLayout::UNDEFINED && state.layout != *home;
+                    moves.then_some(CellBarrier {
                         src_stages: state.stages(),
                         src_access: state.write_access,
                         dst_stages: vk::PipelineStageFlags2::ALL_COMMANDS,
                         dst_access: vk::AccessFlags2::MEMORY_READ | vk::AccessFlags2::MEMORY_WRITE,
                         old_layout: state.layout,
-                        new_layout: home,
+                        new_layout: *home,
                     })
                 })
                 .collect();
@@ -265,6 +278,60 @@ impl<'a> BarrierPlanner<'a> {
         }
         out
     }
+
+    /// Layouts of the parts of resources between frames; `None` where none must hold.
+    pub(super) fn into_homes(self) -> Vec<Option<Vec<vk::ImageLayout>>> {
+        self.homes
+    }
+}
+
+/// Layouts that hold between frames: of imports, which have one, and of images with history, whose two versions change places then. That is
+/// the layout in which the frame before is read first, so that its readers need no transition; where nobody reads, the last one.
+fn homes(
+    resources: &[PlannedResource],
+    uses: &[&BTreeMap<Cell, CellUse>],
+) -> Vec<Option<Vec<vk::ImageLayout>>> {
+    let of_version = |index: usize, version: Version| {
+        let id = ResourceId(index as u32);
+        let (before, now) = match version {
+            Version::Before { now } => (id, now),
+            Version::Now { before } => (before, id),
+        };
+        let cells = 0..cell_count(&resources[index].kind);
+        let layout = |cell: usize| {
+            let first_read = uses.iter().find_map(|uses| uses.get(&(before, cell)));
+            let last = || uses.iter().rev().find_map(|uses| uses.get(&(now, cell)));
+            first_read.or_else(last).map_or(vk::ImageLayout::UNDEFINED, |one| one.layout)
+        };
+        cells.map(layout).collect()
+    };
+    let home = |(index, resource): (usize, &PlannedResource)| match (&resource.import, resource.version) {
+        (Some(Import::Image { layout, .. }), _) => Some(vec![*layout; cell_count(&resource.kind)]),
+        #[cfg(test)]
+        (Some(Import::Fake { layout }), _) => Some(vec![*layout; cell_count(&resource.kind)]),
+        (None, Some(version)) if matches!(resource.kind, ResourceKind::Image(_)) => {
+            Some(of_version(index, version))
+        }
+        _ => None,
+    };
+    resources.iter().enumerate().map(home).collect()
+}
+
+/// Stages that use either version of each resource with history, and how they write. The frame before may have used the memory of one in the
+/// way of the other, or in the same way where it is drawn again.
+fn uses_of_versions(
+    resources: &[PlannedResource],
+    uses: &[&BTreeMap<Cell, CellUse>],
+) -> Vec<(vk::PipelineStageFlags2, vk::AccessFlags2)> {
+    let mut earlier = vec![(vk::PipelineStageFlags2::NONE, vk::AccessFlags2::NONE); resources.len()];
+    for ((id, _), one) in uses.iter().flat_map(|uses| uses.iter()) {
+        let Some(version) = resources[id.0 as usize].version else { continue };
+        for of in [*id, version.other()] {
+            let all = &mut earlier[of.0 as usize];
+            *all = (all.0 | one.stages, all.1 | one.access & WRITES);
+        }
+    }
+    earlier
 }
 
 fn lower(resource: Option<ResourceId>, range: Subresource, barrier: &CellBarrier) -> Barrier {

@@ -6,16 +6,38 @@ use afterlight_gpu::vk;
 
 use super::hazards::{Cell, CellUse, cell_count, cells_of, mips_of};
 use super::resolve::Resolved;
-use crate::declare::{Graph, Import, ResourceId, ResourceKind, ResourceNode};
+use crate::declare::{Graph, Import, ResourceId, ResourceKind, ResourceNode, Version};
 use crate::error::GraphError;
 
-/// Finds the passes whose results are used, from the last to the first.
+/// Finds the passes whose results are used: by this frame, or by the next one where live passes read what the frame before wrote.
 pub(super) fn live_passes(graph: &Graph, uses: &[BTreeMap<Cell, CellUse>]) -> Vec<bool> {
+    let mut read_next = vec![false; graph.resources.len()];
+    loop {
+        let live = live_passes_where(graph, uses, &read_next);
+        let mut next = read_next.clone();
+        for (uses, _) in uses.iter().zip(&live).filter(|(_, live)| **live) {
+            for (id, _) in uses.keys() {
+                if let Some(Version::Before { now }) = graph.resources[id.0 as usize].version {
+                    next[now.0 as usize] = true;
+                }
+            }
+        }
+        // What is read can only become more.
+        if next == read_next {
+            return live;
+        }
+        read_next = next;
+    }
+}
+
+/// The same, from the last pass to the first, where the next frame reads these resources.
+fn live_passes_where(graph: &Graph, uses: &[BTreeMap<Cell, CellUse>], read_next: &[bool]) -> Vec<bool> {
     let mut wanted: BTreeMap<Cell, bool> = BTreeMap::new();
     for (index, resource) in graph.resources.iter().enumerate() {
         let id = ResourceId(index as u32);
         for cell in 0..cell_count(&resource.kind) {
-            wanted.insert((id, cell), resource.kept || resource.import.is_some());
+            let is_wanted = resource.kept || resource.import.is_some() || read_next[index];
+            wanted.insert((id, cell), is_wanted);
         }
     }
     let mut live = vec![false; graph.passes.len()];
@@ -40,7 +62,7 @@ pub(super) fn check_reads_after_writes(
 ) -> Result<(), GraphError> {
     let mut written: BTreeMap<Cell, vk::ImageAspectFlags> = BTreeMap::new();
     let has_contents = |resource: &ResourceNode| match &resource.import {
-        None => false,
+        None => resource.is_before(),
         Some(Import::Buffer(_)) => true,
         Some(Import::Image { layout, .. }) => *layout != vk::ImageLayout::UNDEFINED,
         #[cfg(test)]
@@ -91,5 +113,33 @@ pub(super) fn lifetimes(graph: &Graph, uses: &[&BTreeMap<Cell, CellUse>]) -> Vec
             lifetime.1 = usize::MAX;
         }
     }
+    // Both versions hold something before the first pass and after the last, and take turns.
+    for (index, resource) in graph.resources.iter().enumerate() {
+        if let Some(version) = resource.version
+            && (lifetimes[index].is_some() || lifetimes[version.other().0 as usize].is_some())
+        {
+            lifetimes[index] = Some((0, usize::MAX));
+        }
+    }
     lifetimes
+}
+
+/// Checks that no pass writes what the frame before wrote, and that some pass writes all that a pass reads of it.
+pub(super) fn check_history(graph: &Graph, uses: &[BTreeMap<Cell, CellUse>]) -> Result<(), GraphError> {
+    let name = |id: ResourceId| graph.resources[id.0 as usize].name.clone();
+    for (pass, of_pass) in graph.passes.iter().zip(uses) {
+        for ((id, cell), cell_use) in of_pass {
+            let Some(Version::Before { now }) = graph.resources[id.0 as usize].version else { continue };
+            if cell_use.write {
+                return Err(GraphError::WritesBefore { pass: pass.name.clone(), resource: name(*id) });
+            }
+            let writes_now =
+                |uses: &BTreeMap<Cell, CellUse>| uses.get(&(now, *cell)).is_some_and(|one| one.write);
+            if !uses.iter().any(writes_now) {
+                let (pass, resource) = (pass.name.clone(), name(*id));
+                return Err(GraphError::NeverWritten { pass, resource, now: name(now) });
+            }
+        }
+    }
+    Ok(())
 }

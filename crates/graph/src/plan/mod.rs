@@ -21,7 +21,7 @@ use afterlight_gpu::vk;
 use afterlight_roles::{BufferRole, PassRole, PassWork};
 
 use crate::bind::BoundSlot;
-use crate::declare::{Import, PassNode, ResourceId, ResourceKind};
+use crate::declare::{Import, PassNode, ResourceId, ResourceKind, Version};
 
 pub use access::Access;
 pub(crate) use access::{aspects, mip_extent};
@@ -73,7 +73,9 @@ pub struct PlannedResource {
     pub buffer_usage: vk::BufferUsageFlags,
     pub(crate) kind: ResourceKind,
     pub(crate) import: Option<Import>,
-    /// Layout of each part after the frame (`layer * mips + mip`).
+    /// Which version it is of a resource with history.
+    pub version: Option<Version>,
+    /// Layout of each part after the frame (`layer * mips + mip`); of imports and of resources with history before it too.
     pub(crate) final_layouts: Vec<vk::ImageLayout>,
 }
 
@@ -113,6 +115,18 @@ impl Plan {
     /// Bytes of all heaps: the most that the frame's transient resources hold at once, as allocated.
     pub fn peak_bytes(&self) -> u64 {
         self.heaps.iter().map(|heap| heap.bytes).sum()
+    }
+
+    /// Whether some resource has history: frames then take turns ([`Turn`](crate::Turn)).
+    pub fn has_history(&self) -> bool {
+        self.resources.iter().any(|resource| resource.version.is_some() && resource.placement.is_some())
+    }
+
+    /// Bytes of resources with history, both versions of each. They are part of [`Plan::peak_bytes`], and of [`Plan::technique_bytes`] unless
+    /// their role is shared work.
+    pub fn history_bytes(&self) -> u64 {
+        let with_history = self.resources.iter().filter(|resource| resource.version.is_some());
+        with_history.map(|resource| resource.need.bytes).sum()
     }
 
     /// Bytes of everything that the technique allocates: without imported resources, the final colour target, and

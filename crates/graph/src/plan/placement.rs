@@ -24,19 +24,20 @@ pub struct PlannedHeap {
 }
 
 /// Places resources: large ones first, each at the lowest offset that no resource alive at the same time holds. Images
-/// and buffers have heaps of their own, so that no granularity between them matters. A heap is one allocation: where the next resource
+/// and buffers have heaps of their own, so that no granularity between them matters; so have resources with history, which may outlive the plan. A heap is one allocation: where the next resource
 /// would make it larger than `most_bytes`, the resource goes to another one. A resource that is larger by itself has a heap alone,
 /// which the device then refuses.
 pub(super) fn place(resources: &mut [PlannedResource], most_bytes: u64) -> Vec<PlannedHeap> {
     let mut heaps: Vec<PlannedHeap> = Vec::new();
-    let mut keys: Vec<(u32, bool)> = Vec::new();
+    let mut keys: Vec<(u32, bool, bool)> = Vec::new();
     let mut order: Vec<usize> = (0..resources.len())
         .filter(|index| resources[*index].lifetime.is_some() && !resources[*index].imported)
         .collect();
     order.sort_by_key(|index| (std::cmp::Reverse(resources[*index].need.bytes), *index));
     for (placed, index) in order.iter().copied().enumerate() {
         let resource = &resources[index];
-        let key = (resource.need.type_bits, matches!(resource.kind, ResourceKind::Image(_)));
+        let is_image = matches!(resource.kind, ResourceKind::Image(_));
+        let key = (resource.need.type_bits, is_image, resource.version.is_some());
         let others = &order[..placed];
         let mut fitting = (0..heaps.len()).filter(|heap| keys[*heap] == key).map(|heap| {
             let offset = lowest_offset(resources, others, heap, resource);

@@ -6,7 +6,7 @@ use afterlight_gpu::vk;
 
 use super::barriers::{Barrier, BarrierPlanner};
 use super::hazards::{Cell, CellUse, join_uses, settle_layouts};
-use super::liveness::{check_reads_after_writes, lifetimes, live_passes};
+use super::liveness::{check_history, check_reads_after_writes, lifetimes, live_passes};
 use super::placement::place;
 use super::requirements::{MemoryNeed, Requirements};
 use super::resolve::{Resolved, resolve_pass};
@@ -32,6 +32,7 @@ impl Graph {
             .zip(&resolved)
             .map(|(pass, resolved)| join_uses(&pass.name, &resolved.accesses, &self.resources))
             .collect::<Result<_, _>>()?;
+        check_history(&self, &uses)?;
         check_reads_after_writes(&self, &uses, &resolved)?;
         check_dispatches(&self, requirements)?;
         for ((pass, resolved), uses) in self.passes.iter().zip(&mut resolved).zip(&uses) {
@@ -50,8 +51,13 @@ impl Graph {
         let final_barriers = planner.finish();
         let final_layouts: Vec<Vec<vk::ImageLayout>> =
             planner.states.iter().map(|cells| cells.iter().map(|cell| cell.layout).collect()).collect();
-        for (resource, layouts) in resources.iter_mut().zip(final_layouts) {
-            resource.final_layouts = layouts;
+        let homes = planner.into_homes();
+        for ((resource, layouts), home) in resources.iter_mut().zip(final_layouts).zip(homes) {
+            let known = |(home, last)| if home == vk::ImageLayout::UNDEFINED { last } else { home };
+            resource.final_layouts = match home {
+                Some(home) => home.into_iter().zip(layouts).map(known).collect(),
+                None => layouts,
+            };
         }
 
         let mut barriers = barriers.into_iter();
@@ -117,11 +123,22 @@ fn planned_resources(
             buffer_usage[id.0 as usize] |= *usage;
         }
     }
-    let mut out = Vec::with_capacity(graph.resources.len());
     for (index, node) in graph.resources.iter().enumerate() {
         if node.kept {
             image_usage[index] |= vk::ImageUsageFlags::TRANSFER_SRC;
             buffer_usage[index] |= vk::BufferUsageFlags::TRANSFER_SRC;
+        }
+    }
+    let mut out = Vec::with_capacity(graph.resources.len());
+    for (index, node) in graph.resources.iter().enumerate() {
+        if let Some(version) = node.version {
+            // The two take turns, and are cleared before the first frame.
+            let other = version.other().0 as usize;
+            let images = image_usage[index] | image_usage[other] | vk::ImageUsageFlags::TRANSFER_DST;
+            let buffers = buffer_usage[index] | buffer_usage[other] | vk::BufferUsageFlags::TRANSFER_DST;
+            for of in [index, other] {
+                (image_usage[of], buffer_usage[of]) = (images, buffers);
+            }
         }
         let used = lifetimes[index].is_some() && node.import.is_none();
         let need = match &node.kind {
@@ -142,6 +159,7 @@ fn planned_resources(
             buffer_usage: buffer_usage[index],
             kind: node.kind.clone(),
             import: node.import.clone(),
+            version: node.version,
             final_layouts: Vec::new(),
         });
     }

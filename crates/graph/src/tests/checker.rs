@@ -50,7 +50,8 @@ fn has_access(all: AccessFlags, some: AccessFlags) -> bool {
 }
 
 fn meet(a: Stages, b: Stages) -> bool {
-    a.intersects(b) || (a.contains(Stages::ALL_COMMANDS) && !b.is_empty())
+    let all = |stages: Stages| stages.contains(Stages::ALL_COMMANDS);
+    a.intersects(b) || (all(a) && !b.is_empty()) || (all(b) && !a.is_empty())
 }
 
 pub struct Checker<'a> {
@@ -62,6 +63,9 @@ pub struct Checker<'a> {
     poison: u64,
 }
 
+/// What resources with history hold before the first frame.
+const CLEARED: u64 = 55;
+
 fn grid(kind: &ResourceKind) -> (u32, u32) {
     match kind {
         ResourceKind::Image(info) => (info.mips, info.layers),
@@ -70,8 +74,25 @@ fn grid(kind: &ResourceKind) -> (u32, u32) {
 }
 
 impl<'a> Checker<'a> {
-    /// Replays `plan`; returns what kept resources hold at the end, or the first fault.
+    /// Replays `plan` once, and where it has history four times, the third a frame that is drawn again; returns what kept resources hold at the
+    /// end, or the first fault.
     pub fn run(plan: &'a Plan) -> Result<HashMap<(String, usize), u64>, String> {
+        let next: &[bool] = if plan.has_history() { &[true, false, true] } else { &[] };
+        Self::frames(plan, next)
+    }
+
+    /// Replays `plan` for a first frame, and one more each of `next`: of the other turn where it is true, else of the same one.
+    pub fn frames(plan: &'a Plan, next: &[bool]) -> Result<HashMap<(String, usize), u64>, String> {
+        let mut checker = Self::new(plan);
+        let mut kept = checker.frame()?;
+        for flips in next {
+            checker.begin_next(*flips);
+            kept = checker.frame()?;
+        }
+        Ok(kept)
+    }
+
+    fn new(plan: &'a Plan) -> Self {
         let mut checker = Checker {
             plan,
             events: Vec::new(),
@@ -87,7 +108,48 @@ impl<'a> Checker<'a> {
                     checker.values.insert((index, cell), 77 + index as u64);
                 }
             }
+            if resource.version.is_some() {
+                for (cell, layout) in resource.final_layouts.iter().enumerate() {
+                    checker.layouts.insert((index, cell), *layout);
+                    checker.values.insert((index, cell), CLEARED);
+                }
+            }
         }
+        checker
+    }
+
+    /// Where each resource of a frame of the other turn finds its memory.
+    fn place_in_turn(&self, resource: usize, flips: bool) -> usize {
+        let version = self.plan.resources[resource].version.filter(|_| flips);
+        version.map_or(resource, |version| version.other().0 as usize)
+    }
+
+    /// Goes on to the next frame. Frames begin after all that was done before; of resources with history the plan's own barriers must say so.
+    fn begin_next(&mut self, flips: bool) {
+        let plan = self.plan;
+        self.events.retain(|event| plan.resources[event.resource].version.is_some());
+        let mut events = std::mem::take(&mut self.events);
+        for event in &mut events {
+            event.resource = self.place_in_turn(event.resource, flips);
+        }
+        self.events = events;
+        let lives_on = |resource: usize| {
+            let resource = &plan.resources[resource];
+            resource.version.is_some() || resource.imported
+        };
+        self.layouts.retain(|(resource, _), _| lives_on(*resource));
+        self.values.retain(|(resource, _), _| lives_on(*resource));
+        let layouts = std::mem::take(&mut self.layouts);
+        let values = std::mem::take(&mut self.values);
+        let turned = |(resource, cell)| (self.place_in_turn(resource, flips), cell);
+        let layouts = layouts.into_iter().map(|(key, layout)| (turned(key), layout)).collect();
+        let values = values.into_iter().map(|(key, value)| (turned(key), value)).collect();
+        (self.layouts, self.values) = (layouts, values);
+    }
+
+    /// Replays one frame; returns what kept resources hold at its end.
+    fn frame(&mut self) -> Result<HashMap<(String, usize), u64>, String> {
+        let (plan, checker) = (self.plan, self);
         checker.check_places()?;
         for pass in &plan.passes {
             checker.barriers(&pass.name, &pass.barriers)?;
@@ -96,6 +158,14 @@ impl<'a> Checker<'a> {
         checker.barriers("the end", &plan.final_barriers)?;
         let mut kept = HashMap::new();
         for (index, resource) in plan.resources.iter().enumerate() {
+            if resource.version.is_some() && matches!(resource.kind, ResourceKind::Image(_)) {
+                for (cell, home) in resource.final_layouts.iter().enumerate() {
+                    let found = checker.layouts.get(&(index, cell)).copied().unwrap_or_default();
+                    if found != *home {
+                        return Err(format!("{}[{cell}] ends in {found:?}, not in {home:?}", resource.name));
+                    }
+                }
+            }
             if let Some(crate::declare::Import::Fake { layout }) = &resource.import {
                 for ((_, cell), found) in checker.layouts.iter().filter(|((id, _), _)| *id == index) {
                     if *layout != vk::ImageLayout::UNDEFINED && found != layout {
@@ -289,7 +359,7 @@ impl<'a> Checker<'a> {
                 }
             }
         }
-        self.evaluate(pass, accesses);
+        self.evaluate(pass, accesses)?;
         for access in accesses {
             let resource = access.resource.0 as usize;
             for cell in self.cells(resource, &access.range) {
@@ -347,13 +417,18 @@ impl<'a> Checker<'a> {
     }
 
     /// Gives each written part a value that tells everything that went into it.
-    fn evaluate(&mut self, pass: &str, accesses: &[Access]) {
+    fn evaluate(&mut self, pass: &str, accesses: &[Access]) -> Result<(), String> {
         let mut inputs: Vec<(String, usize, u64)> = Vec::new();
         for access in accesses {
             let resource = access.resource.0 as usize;
             let reads = !access.write || (!access.discard && access.access != writes(access.access));
             for cell in self.cells(resource, &access.range) {
                 if reads {
+                    let is_lost = self.values.get(&(resource, cell)).is_some_and(|value| value >> 63 == 1);
+                    if is_lost && self.plan.resources[resource].version.is_some() && !access.write {
+                        let name = &self.plan.resources[resource].name;
+                        return Err(format!("{pass}: {name}[{cell}] has lost what the frame before wrote"));
+                    }
                     let value = self.value(resource, cell);
                     inputs.push((self.plan.resources[resource].name.clone(), cell, value));
                 }
@@ -372,6 +447,7 @@ impl<'a> Checker<'a> {
             }
             self.spoil_aliases(resource);
         }
+        Ok(())
     }
 
     /// What a part holds; unwritten memory counts as one value, so that plans can be compared.

@@ -2,6 +2,7 @@
 
 mod checker;
 mod errors;
+mod history;
 mod plans;
 
 use afterlight_gpu::{GpuError, vk};

@@ -325,10 +325,11 @@ fn mutants_are_caught() {
 }
 
 /// What a random pass does, as numbers that [`random_graph`] reads as it can.
-type Step = (u8, Vec<u8>);
+pub type Step = (u8, Vec<u8>);
 
-struct Frame {
-    graph: Graph,
+/// A random frame under declaration.
+pub struct Frame {
+    pub graph: Graph,
     images: Vec<(Option<ImageHandle>, bool)>,
     buffers: Vec<(Option<BufferHandle>, bool)>,
 }
@@ -475,7 +476,11 @@ fn random_transfer(frame: &mut Frame, name: &str, picks: &[u8]) {
 }
 
 fn random_graph(steps: &[Step], kept: u16, keep_all: bool) -> Graph {
-    let mut graph = Graph::new();
+    random_frame_in(Graph::new(), steps, kept, keep_all).graph
+}
+
+/// Adds random passes to a graph.
+pub fn random_frame_in(mut graph: Graph, steps: &[Step], kept: u16, keep_all: bool) -> Frame {
     let infos = [
         ImageInfo::new(COLOR, 32, 32),
         ImageInfo::new(COLOR, 32, 32),
@@ -521,7 +526,7 @@ fn random_graph(steps: &[Step], kept: u16, keep_all: bool) -> Graph {
             frame.graph.keep(handle);
         }
     }
-    frame.graph
+    frame
 }
 
 proptest! {

@@ -126,6 +126,12 @@ const BUILTINS: &[Builtin] = &[
         keys: &[Key { name: "width", default: 40, min: 1, max: 100_000, about: "width and depth, metres" }],
         make: |v| simple::floor(v.get("width")),
     },
+    Builtin {
+        name: "crowd",
+        about: "small figures in rows on a floor: many nodes of few meshes, most of them out of view",
+        keys: &[Key { name: "nodes", default: 2048, min: 1, max: 1_000_000, about: "figures" }],
+        make: |v| simple::crowd(v.get("nodes")),
+    },
 ];
 
 /// All built-in scenes.

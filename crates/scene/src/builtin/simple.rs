@@ -8,6 +8,7 @@ use super::kit::{Front, MeshData, SceneBuilder};
 use crate::{
     AlphaMode, Camera, Environment, Light, LightKind, Material, Projection, Sampler, Scene, TextureRef, Wrap,
     animation::{Animation, Curve, Interpolation, NodeTrack},
+    rng::SplitMix64,
 };
 
 /// A light from infinity; lux.
@@ -35,7 +36,7 @@ pub(super) fn lamp(position_ws: Vec3, intensity: Vec3) -> Light {
 /// An orthographic camera that looks along −Z at the origin, 1 m from the middle to the upper edge.
 fn flat_camera(name: &str) -> Camera {
     Camera {
-        name: name.to_owned(),
+        name: name.into(),
         world_from_view: Affine3A::from_translation(Vec3::new(0.0, 0.0, 5.0)),
         projection: Projection::Orthographic { half_height_m: 1.0, near_m: 0.1, far_m: 10.0 },
     }
@@ -383,3 +384,74 @@ fn pulse() -> Curve<Vec3> {
 
 /// An alpha mask with glTF's cutoff.
 pub(super) const MASK: AlphaMode = AlphaMode::Mask { cutoff: 0.5 };
+
+/// Distance between figures of the crowd, m.
+const CROWD_STEP_M: f32 = 1.6;
+
+/// A body of revolution about +Y, 1 m high: radius and height of points along its profile, m.
+type Profile = [[f64; 2]];
+
+/// Name, colour and profile of the crowd's figures.
+const FIGURES: [(&str, [f32; 3], &Profile); 4] = [
+    ("stone", [0.62, 0.56, 0.5], &[[0.0, 0.0], [0.5, 0.1], [0.46, 0.5], [0.2, 0.62], [0.0, 0.64]]),
+    (
+        "vase",
+        [0.62, 0.26, 0.18],
+        &[[0.0, 0.0], [0.24, 0.0], [0.4, 0.4], [0.16, 0.8], [0.24, 1.0], [0.0, 0.9]],
+    ),
+    (
+        "pawn",
+        [0.22, 0.42, 0.55],
+        &[[0.0, 0.0], [0.36, 0.0], [0.12, 0.6], [0.24, 0.8], [0.12, 1.0], [0.0, 1.0]],
+    ),
+    ("cone", [0.3, 0.45, 0.25], &[[0.0, 0.0], [0.4, 0.0], [0.0, 1.0]]),
+];
+
+/// The point at a fraction of a profile, whose pieces are of equal length in it.
+fn along(profile: &Profile, t: f64) -> DVec2 {
+    let at = t * (profile.len() - 1) as f64;
+    let piece = (at as usize).min(profile.len() - 2);
+    let [from, to] = [profile[piece], profile[piece + 1]].map(DVec2::from);
+    from.lerp(to, at - piece as f64)
+}
+
+/// Figures of four kinds in rows on a floor, of random size, turn and place: many nodes of few meshes.
+pub(super) fn crowd(nodes: u32) -> Scene {
+    let mut b = SceneBuilder::default();
+    let figures = FIGURES.map(|(name, color, profile)| {
+        let mut data = MeshData::default();
+        let pieces = profile.len() as u32 - 1;
+        data.revolve([12, pieces], DVec3::ZERO, false, |t| along(profile, t), DVec2::ONE);
+        let material = b.material(plain(name, color, 0.0, 0.6));
+        (name, b.mesh(name, &data, material))
+    });
+    let columns = f64::from(nodes).sqrt().ceil() as u32;
+    let half_m = 0.5 * CROWD_STEP_M * columns as f32;
+    let mut random = SplitMix64::new(17);
+    for i in 0..nodes {
+        let (name, mesh) = figures[random.next_u64() as usize % figures.len()];
+        let place = [i % columns, i / columns].map(|step| {
+            let off_the_row = 0.5 * (random.next_f32() - 0.5);
+            (step as f32 + 0.5 + off_the_row) * CROWD_STEP_M - half_m
+        });
+        let turn = Quat::from_rotation_y(random.between(0.0, 6.28));
+        let size = Vec3::splat(random.between(0.5, 1.3));
+        let at_ws = Vec3::new(place[0], 0.0, place[1]);
+        b.place(&format!("{name} {i}"), mesh, Affine3A::from_scale_rotation_translation(size, turn, at_ws));
+    }
+    let ground = b.material(plain("ground", [0.4, 0.38, 0.34], 0.0, 0.9));
+    let mut floor = MeshData::default();
+    let width_m = 2.0 * f64::from(half_m + 4.0);
+    let corner = DVec3::new(-0.5 * width_m, 0.0, -0.5 * width_m);
+    floor.rectangle([1, 1], DVec3::Y, corner, [DVec3::X * width_m, DVec3::Z * width_m], 1.0);
+    b.add("floor", &floor, ground);
+    b.scene.lights = vec![sun(Vec3::new(0.4, -1.0, -0.3), Vec3::new(2.6, 2.4, 2.1))];
+    b.scene.environment =
+        Environment { ambient_radiance: Vec3::splat(0.12), background_radiance: Vec3::new(0.25, 0.32, 0.42) };
+    let camera = |name, eye_ws: Vec3| Camera::look_at(name, eye_ws, Vec3::ZERO, 55f32.to_radians(), 0.1);
+    b.scene.cameras = vec![
+        camera("standing", Vec3::new(0.0, 1.7, half_m + 2.0)),
+        camera("above", Vec3::new(0.0, half_m, half_m)),
+    ];
+    b.scene
+}

@@ -458,7 +458,7 @@ pub(super) fn make_lights_and_cameras(
                             .camera_nodes
                             .push(Attachment { index: scene.cameras.len() as u32, node: place });
                     }
-                    scene.cameras.push(Camera { name, world_from_view, projection });
+                    scene.cameras.push(Camera { name: name.into(), world_from_view, projection });
                 }
                 None => scene.warnings.push(format!("camera {name:?} has no orientation and is left out")),
             }

@@ -9,6 +9,7 @@ mod radiance_target;
 pub mod samples;
 pub mod shade;
 pub mod triangles;
+pub mod velocity;
 pub mod visible;
 
 pub use radiance_target::RadianceTarget;

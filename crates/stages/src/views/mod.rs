@@ -4,25 +4,28 @@
 
 mod light_pairs;
 mod records;
+mod velocity;
 
 pub use light_pairs::light_pair_colors;
 pub use records::{ATTRIBUTE_ERRORS, RECORD_SAMPLES, RecordSource};
+pub use velocity::velocity_colors;
 
 use afterlight_frame::{
     Frame, Technique, TechniqueError,
-    views::{CLUSTERS, LIGHT_PAIRS},
+    views::{CLUSTERS, LIGHT_PAIRS, VELOCITY},
 };
 use afterlight_graph::{BufferRole, Graph, ImageHandle, PassRole, RasterPass, gpu::vk};
 
 use crate::lights::cells::{ClusterParams, TileParams};
 
-/// Debug views that a technique has besides [`afterlight_frame::views::FINAL`]: its own, those of light pairs, and that of cells.
+/// Debug views that a technique has besides [`afterlight_frame::views::FINAL`]: its own, those of light pairs, that of cells, and that of
+/// velocities, which any has.
 pub fn of(technique: &dyn Technique) -> Vec<&'static str> {
     let params = technique.params();
     let pairs = if technique.counts_light_pairs() { LIGHT_PAIRS } else { &[] };
     let has_cells = params.holds::<TileParams>() || params.holds::<ClusterParams>();
     let cells = if has_cells { &[CLUSTERS][..] } else { &[] };
-    technique.info().views.iter().chain(pairs).chain(cells).copied().collect()
+    technique.info().views.iter().chain(pairs).chain(cells).chain(&[VELOCITY]).copied().collect()
 }
 
 /// A count a pixel that fragment shaders add to.

@@ -112,8 +112,8 @@ impl Draws {
         // There are no more runs than draws.
         let most = frame.scene.draw_count();
         let named = ("hybrid draw counts", BufferRole::Scene);
-        let counts = frame.table_of_view(graph, named, most, move |view| {
-            runs(params, view).iter().map(|run| run.places.len() as u32).collect()
+        let counts = frame.table_of_view(graph, named, most, move |view, words| {
+            words.extend(runs(params, view).iter().map(|run| run.places.len() as u32));
         })?;
         let named = ("hybrid own draw", ChangesWith::Camera);
         let of_view = frame

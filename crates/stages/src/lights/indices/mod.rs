@@ -1,6 +1,8 @@
 //! The indices of the four nearest lights, packed into every pixel by blending, for `light-indexed` and `light-indexed-forward`:
 //! see the README of this folder.
 
+use std::sync::{Mutex, PoisonError};
+
 use afterlight_graph::{Blend, BlendEquation, BufferRole, Graph, ImageHandle, Load, PassRole, gpu::vk};
 use glam::Mat4;
 
@@ -90,10 +92,18 @@ pub fn build(
         graph.image(&name, BufferRole::Lights, frame.image_info(vk::Format::R16G16B16A16_SFLOAT))
     };
     let cleared: Vec<ImageHandle> = (0..count).map(image).collect();
-    let order =
-        frame.table_of_view(graph, ("light order", BufferRole::Lights), bounded as usize, |view| {
-            far_to_near(view.lights, view.camera.clip_from_world)
-        })?;
+    // Kept for its memory.
+    let keyed = Mutex::new(Vec::new());
+    let order = frame.table_of_view(
+        graph,
+        ("light order", BufferRole::Lights),
+        bounded as usize,
+        move |view, words| {
+            let mut keyed = keyed.lock().unwrap_or_else(PoisonError::into_inner);
+            far_to_near(view.lights, view.camera.clip_from_world, &mut keyed);
+            words.extend(keyed.iter().map(|(_, light)| *light));
+        },
+    )?;
 
     let mut pass = graph.raster(&format!("{}/indices", technique), PassRole::LightAssignment);
     frame.bind_scene(&mut pass);
@@ -128,13 +138,12 @@ impl LightIndices {
 }
 
 /// Numbers of the lights with an end, those whose centre is farthest along the view direction first; of equals the last first, so
-/// that the first are kept.
-fn far_to_near(lights: &SceneLights, clip_from_world: Mat4) -> Vec<u32> {
-    let mut keyed: Vec<(f32, u32)> = (lights.unbounded_count..lights.count)
-        .map(|i| (beyond_near(&lights.lights[i as usize], clip_from_world), i))
-        .collect();
-    keyed.sort_by(|a, b| b.0.total_cmp(&a.0).then(b.1.cmp(&a.1)));
-    keyed.into_iter().map(|(_, light)| light).collect()
+/// that the first are kept; with how far that is.
+fn far_to_near(lights: &SceneLights, clip_from_world: Mat4, keyed: &mut Vec<(f32, u32)>) {
+    let key = |light: u32| (beyond_near(&lights.lights[light as usize], clip_from_world), light);
+    keyed.clear();
+    keyed.extend((lights.unbounded_count..lights.count).map(key));
+    keyed.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(b.1.cmp(&a.1)));
 }
 
 /// How far a light's centre lies beyond the near plane, in a unit of the projection: w − z, depth being reversed (Gribb and

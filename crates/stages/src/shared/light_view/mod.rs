@@ -1,7 +1,7 @@
 //! A light's view of the scene: which light it is, and how a frame looks through it. What indirect light is gathered from
 //! (`shared/indirect/`) and shadows (`shared/shadow/`) are passes through it.
 
-use std::f32::consts::PI;
+use std::{f32::consts::PI, sync::Arc};
 
 use afterlight_graph::{BufferHandle, BufferRole, Graph, gpu::vk};
 use afterlight_scene::{Aabb, Camera, Light, LightKind, Projection};
@@ -79,7 +79,7 @@ impl SourceView {
 /// Along the light, around all corners of the bounds.
 fn directional_view(light: &Light, bounds_ws: &Aabb) -> Camera {
     let center_ws = bounds_ws.center();
-    let mut camera = Camera::look_at("light", center_ws, center_ws + light.direction_ws, 1.0, 0.1);
+    let mut camera = Camera::look_at(Arc::default(), center_ws, center_ws + light.direction_ws, 1.0, 0.1);
     let axes = camera.world_from_view.matrix3;
     let half_size = 0.5 * bounds_ws.size();
     // Half the extent of a box along an axis, a little more so that what lies in its sides is not clipped.
@@ -94,9 +94,10 @@ fn directional_view(light: &Light, bounds_ws: &Aabb) -> Camera {
     camera
 }
 
+/// Views of lights are made for every frame: they have no name, which would be memory.
 fn perspective_view(light: &Light, target_ws: Vec3, angle_rad: f32, bounds_ws: &Aabb) -> Camera {
     let near_m = (1e-4 * bounds_ws.size().length()).max(1e-4);
-    Camera::look_at("light", light.position_ws, target_ws, angle_rad.max(1e-3), near_m)
+    Camera::look_at(Arc::default(), light.position_ws, target_ws, angle_rad.max(1e-3), near_m)
 }
 
 /// The light of a view's settings, and what it sees; `None` without a light or a surface. Displaced surfaces are in view too.
@@ -145,9 +146,9 @@ pub fn look_through<T>(
     declare: impl FnOnce(&mut Graph, &Frame<'_>) -> Result<T, TechniqueError>,
 ) -> Result<T, TechniqueError> {
     let constants = constants_of_pose(graph, frame, &format!("{pass} view"), move |view| {
-        through(view, size_px).map_or_else(FrameConstants::zeroed, |camera| FrameConstants {
-            samples: 1,
-            ..camera.constants(view.settings, view.lights, &view.bounds_ws())
+        through(view, size_px).map_or_else(FrameConstants::zeroed, |camera| {
+            let of_view = camera.constants(view.settings, view.lights, &view.bounds_ws());
+            FrameConstants { samples: 1, ..view.time.alone().constants(of_view) }
         })
     })?;
     let scene = SceneOfDraws::of(frame);

@@ -41,9 +41,14 @@ impl SurfaceShaders {
             return Ok(Self { vertex: frame.shader(vertex)?, tessellation: None, geometry: None, fragment });
         }
         let evaluation = frame.shader(&vertex.replacen(".vert", ".tese", 1))?;
+        let (vertex, control) = match vertex.contains("#velocity") {
+            true => ("surface.vert#tessellation-velocity", "surface.tesc#velocity"),
+            false => ("surface.vert#tessellation", "surface.tesc"),
+        };
+        let of_stage = |name: &str| frame.shader(&format!("surfaces/geometry/{name}"));
         Ok(Self {
-            vertex: frame.shader("surfaces/geometry/surface.vert#tessellation")?,
-            tessellation: Some((frame.shader("surfaces/geometry/surface.tesc")?, evaluation)),
+            vertex: of_stage(vertex)?,
+            tessellation: Some((of_stage(control)?, evaluation)),
             geometry: None,
             fragment,
         })

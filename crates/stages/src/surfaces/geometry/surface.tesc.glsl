@@ -19,6 +19,9 @@ layout(location = 2) in vec4 vertex_color[];
 layout(location = 3) in vec3 vertex_position_ws[];
 layout(location = 4) in vec3 vertex_normal_ws[];
 layout(location = 5) in vec4 vertex_tangent_ws[];
+#ifdef VELOCITY
+layout(location = 6) in vec3 vertex_before_ws[];
+#endif
 
 layout(location = 0) patch out uvec2 patch_draw_material;
 layout(location = 1) out vec4 patch_uv0_uv1[3];
@@ -26,6 +29,9 @@ layout(location = 2) out vec4 patch_color[3];
 layout(location = 3) out vec3 patch_position_ws[3];
 layout(location = 4) out vec3 patch_normal_ws[3];
 layout(location = 5) out vec4 patch_tangent_ws[3];
+#ifdef VELOCITY
+layout(location = 6) out vec3 patch_before_ws[3];
+#endif
 
 const float MAX_SEGMENTS = 64.0;    // supported by every device that has tessellation
 
@@ -84,6 +90,9 @@ void main() {
     patch_position_ws[gl_InvocationID] = vertex_position_ws[gl_InvocationID];
     patch_normal_ws[gl_InvocationID] = vertex_normal_ws[gl_InvocationID];
     patch_tangent_ws[gl_InvocationID] = vertex_tangent_ws[gl_InvocationID];
+#ifdef VELOCITY
+    patch_before_ws[gl_InvocationID] = vertex_before_ws[gl_InvocationID];
+#endif
     if (gl_InvocationID != 0) {
         return;
     }

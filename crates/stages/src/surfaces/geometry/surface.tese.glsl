@@ -24,6 +24,10 @@ layout(location = 2) in vec4 patch_color[];
 layout(location = 3) in vec3 patch_position_ws[];
 layout(location = 4) in vec3 patch_normal_ws[];
 layout(location = 5) in vec4 patch_tangent_ws[];
+#ifdef VELOCITY
+layout(location = 6) in vec3 patch_before_ws[];
+#include "surfaces/geometry/clip_before.glsl"
+#endif
 
 invariant gl_Position;
 
@@ -51,6 +55,16 @@ void main() {
     }
     gl_Position = frame.clip_from_world * vec4(world, 1.0);
     draw_material = patch_draw_material;
+#ifdef VELOCITY
+    // The field of displacement stands still in the world: a surface that moves through it is displaced elsewhere.
+    vec3 before = AT_POINT(patch_before_ws);
+    mat3 unused;
+    if (DISPLACEMENT_M > 0.0) {
+        before = displaced(before, DISPLACEMENT_M, unused);
+    }
+    clip_now = gl_Position.xyw;
+    clip_before = clip_of_before(before, clip_now);
+#endif
 #ifndef POSITION_ONLY
     uv0_uv1 = AT_POINT(patch_uv0_uv1);
     color = AT_POINT(patch_color);

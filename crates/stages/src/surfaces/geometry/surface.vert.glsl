@@ -2,7 +2,8 @@
 //
 // One path for the position in all variants, `invariant`, so that passes with an equal depth test meet the depths of
 // the pass before. Variants: POSITION_ONLY (depth and IDs of opaque surfaces), WITH_UV (the same with coordinates for an
-// alpha test), none (all attributes), CENTROID (and the position once more). TESSELLATION hands world space on to
+// alpha test), none (all attributes), CENTROID (and the position once more). VELOCITY beside the first two: where the
+// surface stood in the frame before. TESSELLATION hands world space on to
 // surface.tesc.glsl; whichever of the others runs then is a variant of surface.tese.glsl.
 #version 460
 #extension GL_GOOGLE_include_directive : require
@@ -19,6 +20,10 @@ layout(location = 7) in uvec4 draw_tail;                  // first index, first 
 
 #ifndef TESSELLATION
 invariant gl_Position;
+#endif
+
+#ifdef VELOCITY
+#include "surfaces/geometry/before.glsl"
 #endif
 
 #ifdef POSITION_ONLY
@@ -43,6 +48,15 @@ void main() {
     gl_Position = frame.clip_from_world * vec4(world, 1.0);
 #endif
     draw_material = uvec2(gl_InstanceIndex, draw_tail.z);
+#ifdef VELOCITY
+    vec3 world_before = position_before(position_os);
+#ifdef TESSELLATION
+    position_before_ws = world_before;
+#else
+    clip_now = gl_Position.xyw;
+    clip_before = clip_of_before(world_before, clip_now);
+#endif
+#endif
 #ifndef POSITION_ONLY
     uv0_uv1 = vec4(uintBitsToFloat(packed_normal_tangent_uv.zw), uintBitsToFloat(packed_uv1_color.xy));
     color = unpackUnorm4x8(packed_uv1_color.z);
