@@ -434,7 +434,7 @@ pub(super) fn crowd(nodes: u32) -> Scene {
             let off_the_row = 0.5 * (random.next_f32() - 0.5);
             (step as f32 + 0.5 + off_the_row) * CROWD_STEP_M - half_m
         });
-        let turn = Quat::from_rotation_y(random.between(0.0, 6.28));
+        let turn = Quat::from_rotation_y(random.between(0.0, std::f32::consts::TAU));
         let size = Vec3::splat(random.between(0.5, 1.3));
         let at_ws = Vec3::new(place[0], 0.0, place[1]);
         b.place(&format!("{name} {i}"), mesh, Affine3A::from_scale_rotation_translation(size, turn, at_ws));
