@@ -139,7 +139,7 @@ fn errors_name_the_technique_and_what_it_has() {
         let refused = afterlight_techniques::set_param(tiled, &mut params, key, value);
         refused.expect_err("is refused").to_string()
     };
-    let expected = r#"parameter "tiles" of tiled-forward: found no such parameter, expected one of: cull, order, tile-px"#;
+    let expected = r#"parameter "tiles" of tiled-forward: found no such parameter, expected one of: cull, cull-on, cull-px, order, tile-px"#;
     assert_eq!(told("tiles", "3"), expected);
     let expected = r#"parameter tile-px: found "3", expected a whole number from 8 to 256"#;
     assert_eq!(told("tile-px", "3"), expected);
