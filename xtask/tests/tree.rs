@@ -142,7 +142,7 @@ fn a_layer_that_looks_up_is_caught() {
         let step = format!("use crate::{path};\n");
         let root = tree(&[above[0], above[1], ("crates/stages/src/lights/step/mod.rs", &step)]);
         let start = format!("crates/stages/src/lights/step/mod.rs:1: found lights/step uses {folder}");
-        expect_one(root.path(), &start, "only shared/sort, lights");
+        expect_one(root.path(), &start, "only shared/sort, shared/cull, lights");
     }
 }
 
@@ -160,7 +160,7 @@ fn every_stage_may_sort_and_the_sort_uses_none() {
     expect_one(
         root.path(),
         &format!("{lights}:1: found lights/bvh uses shared/shadow"),
-        "only shared/sort, lights",
+        "only shared/sort, shared/cull, lights",
     );
 }
 
@@ -226,7 +226,7 @@ fn a_manifest_that_names_what_is_above_it_is_caught() {
     expect_one(
         root.path(),
         "crates/stages/src/lights/cells/variants.txt:2: found lights/cells uses surfaces/x",
-        "only shared/sort, lights",
+        "only shared/sort, shared/cull, lights",
     );
 }
 
