@@ -7,7 +7,7 @@ use serde::Serialize;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Phase {
-    /// What all techniques share: the light's view, and blended surfaces.
+    /// What all techniques share: the choice of draws, the light's view, and blended surfaces.
     Indirect,
     /// The depth pre-pass.
     Prepass,
@@ -30,9 +30,9 @@ pub enum Phase {
 impl Phase {
     fn of_role(role: PassRole) -> Phase {
         match role {
-            PassRole::Shared | PassRole::Transparency => Phase::Indirect,
+            PassRole::Shared | PassRole::Culling | PassRole::Transparency => Phase::Indirect,
             PassRole::DepthPrepass => Phase::Prepass,
-            PassRole::Culling | PassRole::Geometry => Phase::Fill,
+            PassRole::Geometry => Phase::Fill,
             PassRole::TriangleSelection => Phase::Find,
             PassRole::Derivatives => Phase::Derivatives,
             PassRole::LightAssignment => Phase::Lights,
