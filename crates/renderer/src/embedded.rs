@@ -36,8 +36,8 @@ impl Renderer {
 
 impl Embedded {
     /// Adds a frame to the caller's commands and a copy of its picture, of the size of the renderer's settings, to the caller's image.
-    /// Numbers of frames rise. Command buffers are submitted in the order in which frames were added: each may read what the one before left. Frames wait for what was recorded before them in the queue's order, and all that follows waits for the
-    /// picture. How many are recorded before the first is done is the caller's choice; each holds its own inputs ([`Flight::bytes`]).
+    /// Numbers of frames rise. Command buffers are submitted in the order in which frames were added: each may read what the one before left.
+    /// Frames wait for what was recorded before them in the queue's order, and all that follows waits for the picture. How many are recorded before the first is done is the caller's choice; each holds its own inputs ([`Flight::bytes`]).
     ///
     /// # Errors
     /// [`GpuError::TargetFormat`](afterlight_graph::gpu::GpuError::TargetFormat); a plan, which techniques that choose their passes by the view make for each view, larger than the

@@ -304,7 +304,7 @@ impl Renderer {
         let options = *params.typed::<DrawParams>();
         let viewed = Viewed::new(settings, self.scene.clone(), self.lights.clone(), moved, options);
         let view = viewed.view();
-        let blended = BlendedList::of_view(&view, &options, moves);
+        let blended = BlendedList::of_view(&view, &options, self.device.features(), moves);
 
         let inputs = ViewInputs::default();
         let mut graph = Graph::new();

@@ -175,6 +175,12 @@ fn draws_are_those_of_the_cpu_twin() {
         let chosen = found(&on, &all, &[]);
         let (mut culled, mut drawn) = (0, 0);
         for (number, (query, found)) in all.iter().zip(&chosen).enumerate() {
+            // What is chosen for the whole image, and then for the rows.
+            let mut whole = *query;
+            whole.0.planes[6..].fill([0.0, 0.0, 0.0, 1.0]);
+            let infos = &scene.rest.infos;
+            let of_rows = query.keep(&whole.choose(&scene.bucket_first, infos), infos);
+            assert_eq!(of_rows, query.choose(&scene.bucket_first, infos), "query {number}: rows");
             let expected = expected(scene, query);
             assert_eq!(found.0, expected.0, "query {number} of {instances} instances: counts");
             assert!(found.1 == expected.1, "query {number} of {instances} instances: {query:?}");

@@ -149,6 +149,12 @@ impl DrawQuery {
         draws
     }
 
+    /// Those of some draws that are needed, in their order.
+    pub fn keep(&self, draws: &DrawsInOrder, infos: &[DrawInfo]) -> DrawsInOrder {
+        let is_needed = |draw: &u32| self.bin(&infos[*draw as usize].bounds_ws).is_some();
+        draws.each_ref().map(|draws| draws.iter().copied().filter(is_needed).collect())
+    }
+
     /// The same in memory that was used before: the draws, and the words that they are sorted by.
     pub fn choose_into(
         &self,

@@ -1,11 +1,12 @@
 //! Frames that take turns: what one writes of a resource with history is what the next one reads.
 
+use std::mem::discriminant;
+
 use afterlight_gpu::{self as gpu, Device, vk};
 
 use super::raster::clear_color;
 use super::read_back::ANY;
 use super::resources::Physical;
-use crate::declare::Version;
 use crate::error::GraphError;
 use crate::plan::{Plan, aspects};
 
@@ -58,12 +59,7 @@ pub(super) fn taken_over(plan: &Plan, earlier: &Plan, physical: &[Physical]) -> 
         let Some(version) = resource.version.filter(|_| resource.placement.is_some()) else { continue };
         let there = earlier.resource(&resource.name)?.0 as usize;
         let found = &earlier.resources[there];
-        let is_same_version = match (version, found.version?) {
-            (Version::Now { .. }, Version::Now { .. }) => true,
-            (Version::Before { .. }, Version::Before { .. }) => true,
-            (Version::Now { .. } | Version::Before { .. }, _) => false,
-        };
-        let is_same = is_same_version
+        let is_same = discriminant(&version) == discriminant(&found.version?)
             && found.kind == resource.kind
             && found.image_usage == resource.image_usage
             && found.buffer_usage == resource.buffer_usage
@@ -84,7 +80,7 @@ pub(super) fn clear_history(device: &Device, plan: &Plan, physical: &[Physical])
     let mut encoder = device.encoder()?;
     for (resource, physical) in plan.resources.iter().zip(physical) {
         match (resource.version, physical) {
-            (Some(Version::Now { .. } | Version::Before { .. }), Physical::Image(image)) => {
+            (Some(_), Physical::Image(image)) => {
                 clear_image(&mut encoder, image, &resource.final_layouts);
             }
             (Some(_), Physical::Buffer(buffer)) => encoder.fill_buffer(buffer, 0),

@@ -1,6 +1,9 @@
 //! The order of triangles with alpha blending, found on the device: their keys, a sort, and a command for each run of triangles of one draw.
 
-use afterlight_graph::{BufferHandle, BufferRole, Graph, PassRole, gpu::vk};
+use afterlight_graph::{
+    BufferHandle, BufferRole, Graph, PassRole,
+    gpu::{self, vk},
+};
 use afterlight_shader::structs::DrawChoiceConstants;
 
 use super::list::OrderedTriangles;
@@ -14,6 +17,11 @@ use afterlight_frame::{
 const GROUP_TRIANGLES: u32 = 256;
 
 const ROLES: (PassRole, BufferRole) = (PassRole::Transparency, BufferRole::Transparency);
+
+/// Whether a device can sort so many triangles: its groups share the memory that the sort takes, and one binding reaches their commands.
+pub(super) fn fits(features: &gpu::Features, triangles: usize) -> bool {
+    sort::fits(features) && COMMAND_BYTES * triangles as u64 <= features.max_storage_buffer_range
+}
 
 /// Declares the passes that put the triangles of a scene in order for each view.
 ///
@@ -135,4 +143,19 @@ fn constants(view: &View<'_>, cull: Cull) -> DrawChoiceConstants {
     let query = view.query_of(&options, view.camera, None).0;
     // Those of the query measure sizes on the image.
     DrawChoiceConstants { distance_from_world: view.camera.distance_from_world().into(), ..query }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_device_sorts_what_its_bindings_and_groups_hold() {
+        let mut features = gpu::Features::default();
+        features.max_shared_memory_bytes = 1 << 15;
+        features.max_storage_buffer_range = 2000;
+        assert!(fits(&features, 100) && !fits(&features, 101));
+        features.max_shared_memory_bytes = 1 << 14;
+        assert!(!fits(&features, 1));
+    }
 }

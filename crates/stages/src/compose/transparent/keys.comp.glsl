@@ -46,6 +46,7 @@ void main() {
     Bounds reached = displaced(transformed_bounds(bounds_os, draw), view.displacement_m);
     uint key = NO_KEY;
     if (is_in_view(view, reached)) {
+        // The last key is of those out of view; of distances none but a NaN has it.
         key = min(~sortable_bits(view_distance_m(draw, triangle.centroid_os)), NO_KEY - 1u);
     }
     keys[number] = key;

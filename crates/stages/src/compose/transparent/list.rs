@@ -2,11 +2,14 @@
 
 use std::sync::Arc;
 
-use afterlight_graph::{BufferHandle, BufferRole, DrawCall, Graph, gpu::vk};
+use afterlight_graph::{
+    BufferHandle, BufferRole, DrawCall, Graph,
+    gpu::{self, vk},
+};
 
 use super::{device, is_drawn};
 use afterlight_frame::{
-    ChangesWith, Cull, DrawParams, Frame, TechniqueError, View, put,
+    ChangesWith, Cull, CullOn, DrawParams, Frame, TechniqueError, View, put,
     scene::blended::{Ordered, ViewOrder},
     scene::draw_list::COMMAND_BYTES,
 };
@@ -36,12 +39,19 @@ enum Order {
 impl BlendedList {
     /// Those of a view; `None` where there are none in it, or the settings ask for none. If the frame `moves`, there is room for every
     /// triangle of the scene.
-    pub fn of_view(view: &View<'_>, options: &DrawParams, moves: bool) -> Option<Self> {
+    pub fn of_view(
+        view: &View<'_>,
+        options: &DrawParams,
+        features: &gpu::Features,
+        moves: bool,
+    ) -> Option<Self> {
         if !is_drawn(view.settings, view.scene) {
             return None;
         }
         let (cull, triangles) = (options.cull, view.placed.blended.triangle_count());
-        if options.cull_on.sorts_on_device(triangles) {
+        // A device that cannot is told only where it is asked to.
+        let can = options.cull_on == CullOn::Gpu || device::fits(features, triangles);
+        if can && options.cull_on.sorts_on_device(triangles) {
             let draw_count = view.placed.blended.in_view_count(&view_order(view, cull));
             let has_any = moves || draw_count > 0;
             return has_any.then_some(Self { draw_count, cull, order: Order::OnDevice });

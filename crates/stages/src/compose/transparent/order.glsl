@@ -1,6 +1,7 @@
 // What the passes that put triangles with alpha blending in order share.
 #ifndef AFTERLIGHT_TRANSPARENT_ORDER
 #define AFTERLIGHT_TRANSPARENT_ORDER
+#include "group_rows.glsl"
 
 const uint NO_KEY = 0xffffffffu;    // of a triangle whose draw is out of view: behind all others
 const uint THREADS = 256u;          // GROUP_TRIANGLES of device.rs
@@ -21,7 +22,7 @@ layout(push_constant) uniform Push {
 
 // The triangle, or its place in the order, that this thread has: groups stand in rows.
 uint own_place() {
-    return (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * THREADS + gl_LocalInvocationIndex;
+    return group_number() * THREADS + gl_LocalInvocationIndex;
 }
 
 #endif

@@ -46,7 +46,7 @@ uint runs_before(uint group, out uint all_runs) {
 void main() {
     uint place = own_place();
     uint all_runs, of_group;
-    uint first_run = runs_before((place - gl_LocalInvocationIndex) / THREADS, all_runs);
+    uint first_run = runs_before(group_number(), all_runs);
     bool begins = begins_run(place);
     uint run = first_run + sum_before(uint(begins), of_group) + uint(begins) - 1u;
     if (place == 0u) {

@@ -165,7 +165,14 @@ pub fn in_rows(
     rows: Range<u32>,
 ) -> Result<DrawCommands, TechniqueError> {
     let named = (name, ChangesWith::Camera);
-    SceneOfDraws::of(frame).by_query(graph, named, move |view| view.query(Some(rows.clone())))
+    let (scene, query) = (SceneOfDraws::of(frame), move |view: &View<'_>| view.query(Some(rows.clone())));
+    match scene.is_on_device() {
+        true => scene.on_device(graph, named, query),
+        // The host has found what the eye has in view.
+        false => scene.on_host(graph, named, move |view| {
+            Cow::Owned(query(view).keep(view.visible(), &view.placed.infos))
+        }),
+    }
 }
 
 /// Bins of draws as the graph knows them.

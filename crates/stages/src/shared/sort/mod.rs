@@ -4,7 +4,7 @@
 
 pub use afterlight_frame::sort_words::{from_sortable_bits, sortable_bits};
 use afterlight_frame::{Frame, TechniqueError};
-use afterlight_graph::{BufferHandle, BufferRole, ComputePass, Graph, PassRole};
+use afterlight_graph::{BufferHandle, BufferRole, ComputePass, Graph, PassRole, gpu::Features};
 
 pub mod twin;
 
@@ -138,6 +138,11 @@ pub fn by_key(
     let sort = Sort { frame, name, roles, most, size };
     let items = sort.declare(graph, items, key_bits)?;
     Ok(Sorted { items, demand: sort.size.map(|size| size.demand) })
+}
+
+/// Whether a group of a device has the shared memory that a sort takes.
+pub fn fits(features: &Features) -> bool {
+    SHARED_BYTES <= features.max_shared_memory_bytes
 }
 
 /// Checks that a group of a device has the shared memory.
